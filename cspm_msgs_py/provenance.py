@@ -25,7 +25,8 @@ class Provenance(StrictModel):
     words say, the source in the `note` or at the head of the file.
     `window` is the time [s] of the recording that was used, `further_windows` those of the further
     recordings; `interval` holds the value with 95 % probability, an end that nothing bounds is
-    None.
+    None. `accuracy` is one standard deviation of the value, in its unit and for each coordinate of
+    a place; a diagnosis takes it for exits and attachments.
     """
 
     provenance: Literal["thesis", "reconstructed", "fitted", "measured", "datasheet", "published"]
@@ -35,6 +36,7 @@ class Provenance(StrictModel):
     window: tuple[float, float] | None = None
     further_windows: tuple[tuple[float, float], ...] = ()
     interval: tuple[float | None, float | None] | None = None
+    accuracy: Annotated[float, Field(ge=0.0)] | None = None
 
     @model_validator(mode="after")
     def _fitted_from(self) -> Self:

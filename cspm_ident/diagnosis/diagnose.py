@@ -29,7 +29,7 @@ from cspm_ident.diagnosis.one_number import with_one_number
 from cspm_ident.diagnosis.parameter import Coefficients
 from cspm_ident.diagnosis.residuals.aliased_tension import chatters_of
 from cspm_ident.diagnosis.residuals.data_split import first_part, whole_part
-from cspm_ident.diagnosis.residuals.file_effects import with_file_bounds
+from cspm_ident.diagnosis.residuals.file_effects import with_file_accuracies, with_file_bounds
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
 from cspm_ident.diagnosis.residuals.load_cell_clock import on_drives_clock
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
@@ -87,6 +87,7 @@ def diagnose(
         *([on_drives_clock(each, thresholds) for each in own] for own in (searched, held_out))
     )
     effects = list(catalogue().values()) if effects is None else effects
+    effects = with_file_accuracies(effects, recordings.searched[0].testbed)
     effects = with_file_bounds(effects, recordings.searched[0].machine)
     own = searched_and_judged(recordings, effects, progress, thresholds)
     progress("parameters, and simulation of held-out data")

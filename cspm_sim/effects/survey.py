@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from cspm_sim.effects.effect import EffectParameter, Values
+from cspm_sim.effects.effect import Effect, EffectParameter, Values
 
 ACCURACY = 1e-3
 """Standard deviation of a surveyed coordinate [m], as of a tape, calliper or total station."""
@@ -13,6 +14,20 @@ ACCURACY = 1e-3
 _DEVIATES = 3.7
 HEALTHY = {axis: (-_DEVIATES * ACCURACY, _DEVIATES * ACCURACY) for axis in "xyz"}
 """How far surveyed coordinates may be off in a healthy machine [m], by name."""
+
+
+def surveyed_to(effect: Effect, accuracy: float) -> Effect:
+    """Return an effect that moves a place of the file, where a survey had another accuracy.
+
+    Args:
+        effect: with `survey_parameters`.
+        accuracy: standard deviation of a coordinate [m].
+    """
+    parameters = tuple(replace(p, usual=accuracy) for p in effect.parameters)
+    limit = _DEVIATES * accuracy
+    healthy = {parameter.name: (-limit, limit) for parameter in parameters}
+    signature = replace(effect.signature, negligible=healthy)
+    return replace(effect, parameters=parameters, signature=signature)
 
 
 def survey_parameters(key: str, axes: str) -> tuple[EffectParameter, ...]:

@@ -9,9 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from cspm_msgs_py.testbed import EffectEntry, Testbed
+from cspm_msgs_py.testbed import EffectEntry, Testbed, TestbedFile
 from cspm_sim.effects import Effect, Elements, catalogue
+from cspm_sim.effects.survey import ACCURACY, surveyed_to
 
+# Keys of the places that effects move.
+_PLACES = {"cable_exit_offset": "exit", "cable_attachment_offset": "attachment"}
 # Noise moves the estimate of an effect that is gone below the file's value.
 _SLACK = 1.05
 
@@ -19,6 +22,31 @@ _SLACK = 1.05
 def with_file_bounds(effects: Sequence[Effect], machine: Testbed) -> list[Effect]:
     """Return effects whose increments may be as negative as a machine's file allows."""
     return [_lowered(each, _most(each, machine)) for each in effects]
+
+
+def with_file_accuracies(effects: Sequence[Effect], file: TestbedFile) -> list[Effect]:
+    """Return effects with the accuracies that a file states of the places that they move.
+
+    Without those of places that it knows exactly. Of several the largest counts for all.
+    """
+    found = []
+    for effect in effects:
+        key = _PLACES.get(effect.id)
+        stated = _stated(file, key) if key else []
+        if not stated:
+            found.append(effect)
+        elif max(stated) > 0.0:
+            found.append(surveyed_to(effect, max(stated)))
+    return found
+
+
+def _stated(file: TestbedFile, key: str) -> list[float]:
+    """Return the accuracies of a place of all cables, the usual one where a cable has none."""
+    paths = (f"cables[{i}].{key}" for i in range(len(file.testbed.cables)))
+    known = [file.provenance[path].accuracy if path in file.provenance else None for path in paths]
+    if all(each is None for each in known):
+        return []
+    return [ACCURACY if each is None else each for each in known]
 
 
 def may_be_less(effect: Effect) -> bool:

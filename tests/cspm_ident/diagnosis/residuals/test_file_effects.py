@@ -11,11 +11,15 @@ from cspm_ident.diagnosis.residuals.file_effects import (
     is_less,
     joined_entries,
     may_be_less,
+    with_file_accuracies,
     with_file_bounds,
 )
+from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import EffectEntry, parse_testbed
+from cspm_msgs_py.yaml_file import dump_yaml
 from cspm_run.library import named_testbed
 from cspm_sim.effects import catalogue
+from cspm_sim.effects.survey import ACCURACY
 
 DRY = "winch_coulomb_friction"
 MACHINE = named_testbed("thesis").testbed
@@ -101,3 +105,39 @@ def test_a_machine_with_less_friction_than_its_file_says_has_another_number(tmp_
     )
     (improved,) = improved_testbed(found, "improved").testbed.effects
     assert improved.numbers["torque"] == pytest.approx(0.011, abs=1e-4)
+
+
+def surveyed(*places):
+    """The thesis's machine, with a wrapped `exit` of its first cables."""
+    content = MACHINE.model_dump(mode="json", exclude_none=True, by_alias=True)
+    for cable, about in zip(content["cables"], places, strict=False):
+        cable["exit"] = {"value": cable["exit"], "provenance": "measured", **about}
+    return parse_testbed(dump_yaml(content), "surveyed")
+
+
+@pytest.mark.parametrize(
+    ("places", "accuracy"),
+    [
+        ([], ACCURACY),
+        ([{}], ACCURACY),
+        ([{"accuracy": 1e-4}], ACCURACY),
+        ([{"accuracy": 1e-4}] * 8, 1e-4),
+        ([{"accuracy": 1e-4}] * 7 + [{"accuracy": 5e-3}], 5e-3),
+        ([{"accuracy": 0.0}] * 8, None),
+    ],
+)
+def test_a_file_says_how_well_its_places_are_known(places, accuracy):
+    """The largest counts, the usual one where a cable states none; exact places are not tested."""
+    exits, dry = catalogue()["cable_exit_offset"], catalogue()[DRY]
+    *found, last = with_file_accuracies([exits, dry], surveyed(*places))
+    assert last is dry
+    assert [p.usual for each in found for p in each.parameters] == [accuracy] * 3 * len(found)
+    assert bool(found) is (accuracy is not None)
+    for each in found:
+        assert each.is_negligible({"x": 3.6 * accuracy, "y": 0.0, "z": -3.6 * accuracy})
+        assert not each.is_negligible({"x": 0.0, "y": 0.0, "z": -3.8 * accuracy})
+
+
+def test_an_accuracy_is_never_negative():
+    with pytest.raises(InputError, match=r"cables\[0\].exit: accuracy"):
+        surveyed({"accuracy": -1e-3})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from cspm_sim.effects.effect import Effect, EffectParameter, Values
@@ -12,8 +12,16 @@ ACCURACY = 1e-3
 
 # Two-sided normal deviate at 1 % for the 48 coordinates of eight cables' ends (Bonferroni).
 _DEVIATES = 3.7
-HEALTHY = {axis: (-_DEVIATES * ACCURACY, _DEVIATES * ACCURACY) for axis in "xyz"}
-"""How far surveyed coordinates may be off in a healthy machine [m], by name."""
+
+
+def healthy(names: Iterable[str], accuracy: float = ACCURACY) -> dict[str, tuple[float, float]]:
+    """Return how far below and above surveyed numbers may lie in a healthy machine, by name.
+
+    Args:
+        names: of the parameters.
+        accuracy: standard deviation of each [m, rad].
+    """
+    return dict.fromkeys(names, (-_DEVIATES * accuracy, _DEVIATES * accuracy))
 
 
 def surveyed_to(effect: Effect, accuracy: float) -> Effect:
@@ -24,9 +32,8 @@ def surveyed_to(effect: Effect, accuracy: float) -> Effect:
         accuracy: standard deviation of a coordinate [m].
     """
     parameters = tuple(replace(p, usual=accuracy) for p in effect.parameters)
-    limit = _DEVIATES * accuracy
-    healthy = {parameter.name: (-limit, limit) for parameter in parameters}
-    signature = replace(effect.signature, negligible=healthy)
+    limits = healthy((parameter.name for parameter in parameters), accuracy)
+    signature = replace(effect.signature, negligible=limits)
     return replace(effect, parameters=parameters, signature=signature)
 
 

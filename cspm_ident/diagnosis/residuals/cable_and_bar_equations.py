@@ -260,7 +260,8 @@ class _Stretch:
         return [(own, at, found.astype("f4")) for own, at, found in self._changes(effect)]
 
     def _changes(self, effect: Effect) -> Iterator[tuple[Candidate, Place, Array]]:
-        for i, name in enumerate(elements_of(effect, self._machine.cable_names, (BAR, FRAME))):
+        bodies = (BAR, FRAME) if self._machine.winch_frame else (BAR,)
+        for i, name in enumerate(elements_of(effect, self._machine.cable_names, bodies)):
             if effect.physics.sense is not None:
                 for place, found in self._read(effect, i, name):
                     yield Candidate(effect, name), place, found

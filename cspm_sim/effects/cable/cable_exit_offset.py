@@ -16,7 +16,7 @@ from cspm_sim.effects.effect import (
     Values,
 )
 from cspm_sim.effects.signals import CableSignal, EndSignal
-from cspm_sim.effects.survey import HEALTHY, shifted, survey_parameters
+from cspm_sim.effects.survey import healthy, shifted, survey_parameters
 
 _LENGTH = slice(CableSignal.LENGTH_BY_EXIT, CableSignal.LENGTH_BY_EXIT + 3)
 _WRENCH = slice(EndSignal.WRENCH_BY_EXIT, EndSignal.WRENCH_BY_EXIT + 18)
@@ -49,7 +49,7 @@ EFFECT = Effect(
     signature=Signature(
         regression=Regression(Channel.TENSION, _columns),
         partners=(Regression(Channel.WRENCH, _wrench),),
-        negligible=HEALTHY,
+        negligible=healthy("xyz"),
     ),
     description=Description(
         noun="exit point",

@@ -19,6 +19,7 @@ from cspm_sim.effects.effect import (
     Values,
 )
 from cspm_sim.effects.signals import FrameSignal
+from cspm_sim.effects.survey import ACCURACY, healthy
 
 
 def _alter(testbed: Testbed, element: int, values: Values) -> Testbed:
@@ -45,11 +46,11 @@ EFFECT = Effect(
     id="frame_pose_offset",
     block=Block.FRAME,
     parameters=tuple(
-        EffectParameter(dof, "m" if i < 3 else "rad", -1.0, 1.0, usual=1e-3)
+        EffectParameter(dof, "m" if i < 3 else "rad", -1.0, 1.0, usual=ACCURACY)
         for i, dof in enumerate(DOFS)
     ),
     physics=Physics(alter=_alter),
-    signature=Signature(regression=Regression(Channel.TENSION, _columns)),
+    signature=Signature(regression=Regression(Channel.TENSION, _columns), negligible=healthy(DOFS)),
     description=Description(
         noun="place relative to its markers",
         equation=(

@@ -88,8 +88,8 @@ def most_in_all(
 ) -> Array | None:
     """Return the upper limit of the sum of two parts, over all pairs that fit as well as the best.
 
-    It is the upper end of the 95 % interval of the regressors' weight, shape (1,). None where every
-    pair has a part with a negative weight.
+    It is the upper end of the 95 % interval of the first regressor's weight, and −∞ for those beside
+    it, shape (m,). None where every pair has a part with a negative weight.
 
     Args:
         gram: of columns about what was found, with the effect's spectrum.
@@ -99,17 +99,22 @@ def most_in_all(
     """
     sums, base = BlockRegression(gram, thresholds), gram.with_nuisance(others)
     parts = [gram.columns_of([c]) for c in _spectrum(gram, candidate)]
-    fitted = (_form(sums, base, np.concatenate(pair)) for pair in combinations(parts, 2))
+    fitted = (_form(sums, base, *pair) for pair in combinations(parts, 2))
     forms = [form for form in fitted if form is not None]
     left = sums.held_out(np.concatenate([base, gram.columns_of([candidate])]))
     best = min([left, *(form.left for form in forms)], key=np.sum)
     most = thresholds.tie_sigma
     tied = [form for form in forms if behind(paired(form.left - best)) <= most]
-    return np.array([max(form.total + form.half for form in tied)]) if tied else None
+    if not tied:
+        return None
+    ends = np.full(len(parts[0]), -np.inf)
+    ends[0] = max(form.total + form.half for form in tied)
+    return ends
 
 
-def _form(sums: BlockRegression, base: Index, parts: Index) -> _Form | None:
-    """Return the parts fitted beside a base; None where one of them is negative."""
+def _form(sums: BlockRegression, base: Index, one: Index, other: Index) -> _Form | None:
+    """Return two parts fitted beside a base; None where the first weight of one is negative."""
+    base, parts = np.concatenate([base, one[1:], other[1:]]), np.array([one[0], other[0]])
     both = np.concatenate([base, parts])
     weights = sums.weights(both)[len(base) :]
     if np.any(weights < 0.0):

@@ -88,8 +88,8 @@ def most_in_all(
 ) -> Array | None:
     """Return the upper limit of the sum of two parts, over all pairs that fit as well as the best.
 
-    It is the upper end of the 95 % interval of the first regressor's weight, and −∞ for those beside
-    it, shape (m,). None where every pair has a part with a negative weight.
+    It is the upper end of the 95 % interval of the first regressor's weight, and −∞ for those
+    beside it, shape (m,). None where every pair has a part with a negative weight.
 
     Args:
         gram: of columns about what was found, with the effect's spectrum.

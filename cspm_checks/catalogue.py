@@ -41,7 +41,8 @@ CHECKS: dict[str, Check] = {
     "late": Check(
         "torque against motion and tension, velocity against position, or poses against the winches"
         " (by inverse kinematics), by more than a sample and four times the scatter of eight"
-        " segments or of the winches (within 0.25 s); with the drift between clocks",
+        " segments or of the winches (within 0.25 s); poses, or all load cells against torque, by"
+        " any time at which they correlate above 0.95; with the drift between clocks",
         "a `clock` of its own with that `offset`, less where it is late, and `skew` for a drift",
     ),
     "stuck": Check(
@@ -54,6 +55,50 @@ CHECKS: dict[str, Check] = {
         " than 20 m wound, 50 m away, more than a turn of roll; a winch or the bar accelerates by"
         " twice what torque, tension and weight allow, again and again",
         "`unit`, `sign` or `offset`, or `unit` of the clock",
+    ),
+    "exchanged": Check(
+        "an encoder follows, by inverse kinematics, the length of another cable; a load cell, by"
+        " the torques less inertia and friction, the tension of another",
+        "the other's `column`",
+    ),
+    "reversed": Check(
+        "an encoder counts the other way, all the time or from an instant on, by inverse"
+        " kinematics; a load cell has the other sign, by the torques",
+        "`sign: -1`",
+    ),
+    "factor": Check(
+        "an encoder winds 1.2 to 50 times more or less than the poses say, and else fits them",
+        "`counts_per_turn` or `scale`, or drum and gear ratio in the test-bed",
+    ),
+    "axes": Check(
+        "poses contradict the encoders by more than a fifth of the motion, and by more than stretch"
+        " and 5 mm of survey; read otherwise (other axes, order or inverse of the quaternion, unit,"
+        " frame or origin) they fit",
+        "the columns and signs that the text names",
+    ),
+    "kinematics": Check(
+        "poses contradict encoders in that way, and no other reading that is tried fits",
+        "exits, attachments and drums in the test-bed, or the columns of both",
+    ),
+    "attitude": Check(
+        "the orientation turns by more than 30° in a frame, or by eight times the fifth largest"
+        " step of the fifty around and 5°",
+        "`drop` the stretches between",
+    ),
+    "drift": Check(
+        "by the balance of forces on the bar, one load cell drifts by six standard errors, a"
+        " hundredth of its tension, and 1.5 times what any other explains",
+        "a zero before and after, or `drift` left to the diagnosis (`tension_drift`)",
+    ),
+    "limit": Check(
+        "a drive is within half a percent of its torque limit in more than a hundredth of the"
+        " samples",
+        "ask for less, or correct `torque_limit`",
+    ),
+    "hum": Check(
+        "a line at 50 or 60 Hz, 100 times the power beside it, with a tenth of what is faster"
+        " than 10 Hz",
+        "shielding and earth of the cable; a filter hides it, and delays",
     ),
     "constant": Check(
         "nothing changes, and no brake is said to hold the winch (`locked`)",

@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_checks.motion import SEGMENTS, SHORTEST, even, motion_columns, smoothed
+from cspm_checks.motion import FEWEST, SEGMENTS, SHORTEST, even, motion_columns, smoothed
 from cspm_checks.series import SensorSeries
 
 Array = NDArray[np.float64]
-FEWEST = 4
 _MOST = 4000
 _CONDITION = 1e-6
 

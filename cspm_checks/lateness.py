@@ -15,7 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from cspm_checks.motion import SEGMENTS, SHORTEST, even, motion_columns, smoothed
+from cspm_checks.motion import (
+    FEWEST,
+    SEGMENTS,
+    SHORTEST,
+    even,
+    motion_columns,
+    smoothed,
+)
 from cspm_checks.series import SensorSeries
 
 Array = NDArray[np.float64]
@@ -27,7 +34,6 @@ SIGMAS = 4.0
 EXPLAINED = 0.9
 GAIN = 0.8
 """What the best shift must leave of the squares that no shift leaves."""
-FEWEST = 4
 _MOST = 4000  # samples of a segment
 _LAGS = 100
 _STILL = 1e-9
@@ -92,12 +98,15 @@ def _by_segments(table: Array, goal: Array, time: Array, step: float) -> list[tu
     # Parabolas find the place between samples: a hundred to each side are enough.
     every = max(int(LONGEST_S / step / _LAGS), 1)
     table, goal, time, step = table[::every], goal[::every], time[::every], step * every
-    most = min(int(LONGEST_S / step), len(goal) // (4 * SEGMENTS))
-    length = min(len(goal) // SEGMENTS, _MOST)
-    if most < 2 or length < SHORTEST:
+    count = min(SEGMENTS, len(goal) // SHORTEST)
+    if count < FEWEST:
+        return []
+    most = min(int(LONGEST_S / step), len(goal) // (4 * count))
+    length = min(len(goal) // count, _MOST)
+    if most < 2:
         return []
     found = []
-    for start in np.linspace(0, len(goal) - length, SEGMENTS).astype(int):
+    for start in np.linspace(0, len(goal) - length, count).astype(int):
         inner = slice(start + most, start + length - most)
         shift = _best_shift(table[inner], goal[start : start + length], most)
         if shift is not None:

@@ -10,15 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_checks.acceleration import acceleration_suspicions
+from cspm_checks.attitude import attitude_suspicions
 from cspm_checks.channel import Channel
 from cspm_checks.clocks import overlap_suspicions
+from cspm_checks.hum import hum_suspicions
+from cspm_checks.machine_suspicions import machine_suspicions
+from cspm_checks.misfit import winding
 from cspm_checks.outlier_suspicions import outlier_suspicions
 from cspm_checks.pace import pace_of
 from cspm_checks.pose_lateness import comparable, pose_lateness
+from cspm_checks.poses import poses_of
 from cspm_checks.relations import relation_suspicions
 from cspm_checks.series import Log, TopicColumns, series_of
 from cspm_checks.stretches import joined, stretches
-from cspm_checks.stuck import frozen_suspicions
+from cspm_checks.stuck import frozen_suspicions, held_frames
 from cspm_checks.suspicion import Suspicion
 from cspm_checks.time_suspicions import held_suspicions, time_suspicions
 from cspm_checks.value_suspicions import quaternion_suspicions, value_suspicions
@@ -62,16 +67,25 @@ def look_at(log: Log, testbed: Testbed, origin_ns: int, factors: Mapping[str, fl
         alone.append(
             [one for each in part.values() for one in _fields(each, testbed, origin_ns, factors)]
         )
-        poses = pose_lateness(part, testbed, origin_ns) if comparable(part, testbed) else None
+        seen = winding(part, testbed, origin_ns) if comparable(part, testbed) else None
+        poses = None if seen is None else pose_lateness(seen)
         judged = judged or poses is not None
-        together.append(relation_suspicions(part, testbed, poses))
-    of_fields = joined(alone, present)
+        together.append(
+            relation_suspicions(part, testbed, poses, origin_ns)
+            + machine_suspicions(part, testbed, seen, origin_ns)
+        )
+    of_machine = joined(together, present)
+    misread = {one.where for one in of_machine if one.kind == "axes"}
+    # Poses that are read wrongly may seem to jump.
+    of_fields = [
+        one for one in joined(alone, present) if one.kind != "attitude" or one.where not in misread
+    ]
     found: list[Suspicion] = []
     for name, columns in log.items():
         found += _of_topic(columns, testbed, origin_ns)
         found += [one for one in of_fields if one.where.partition(" ")[0] == name]
     found += overlap_suspicions(log)
-    return Look(found + joined(together, present), [] if judged else [_UNJUDGED])
+    return Look(found + of_machine, [] if judged else [_UNJUDGED])
 
 
 def _of_topic(columns: TopicColumns, testbed: Testbed, origin_ns: int) -> list[Suspicion]:
@@ -108,7 +122,8 @@ def _frozen(columns: TopicColumns, origin_ns: int) -> list[Suspicion]:
         series = [(f"{name} {one}", columns.values(one)[:, None]) for one in columns.measured]
     else:
         series = [(name, columns.rows(slice(None)))]
-    return [one for where, rows in series for one in frozen_suspicions(where, rows, seconds)]
+    found = [one for where, rows in series for one in frozen_suspicions(where, rows, seconds)]
+    return found + (held_frames(*series[0], seconds) if name in _POSES else [])
 
 
 def _fields(
@@ -117,10 +132,14 @@ def _fields(
     """Return what looks wrong in the numbers of a topic."""
     topic = columns.topic
     found = _frozen(columns, origin_ns) if topic.name in (_TENSION, *_POSES) else []
+    if topic.name in _POSES:
+        found += attitude_suspicions(topic.name, poses_of(columns, origin_ns))
     for field in columns.measured:
         channel = Channel(topic, field, factors.get(f"{topic.name} {field}", 1.0))
         values = columns.values(field)
         found += value_suspicions(channel, values, testbed)
         found += acceleration_suspicions(channel, series_of(columns, field, origin_ns), testbed)
         found += outlier_suspicions(channel, values, columns.stamp_ns, origin_ns)
+        if field.startswith("effort/"):
+            found += hum_suspicions(channel, series_of(columns, field, origin_ns))
     return found

@@ -11,7 +11,7 @@ from scipy.signal import savgol_filter
 from cspm_checks.series import SensorSeries
 
 Array = NDArray[np.float64]
-SEGMENTS = 8
+SEGMENTS, FEWEST = 8, 4
 SHORTEST = 200
 """Samples of a segment."""
 _SMOOTH, _ORDER = 15, 3
@@ -21,7 +21,7 @@ _UNEVEN = 0.1
 def even(series: SensorSeries) -> tuple[Array, Array, float] | None:
     """Return instants at equal steps, values there and the step; None if stamps are too uneven."""
     steps = np.diff(series.time)
-    if len(steps) < SEGMENTS * SHORTEST:
+    if len(steps) < FEWEST * SHORTEST:
         return None
     step = float(np.median(steps))
     if step <= 0 or np.mean(np.abs(steps - step) > _UNEVEN * step) > _UNEVEN:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_checks.channel import Channel
 from cspm_checks.outliers import Outliers, find_outliers
+from cspm_checks.stuck import is_held
 from cspm_checks.suspicion import Suspicion
 
 Array = NDArray[np.float64]
@@ -14,6 +17,7 @@ SHOWN = 10
 SHOWN_SIZES = 3
 _SIGMAS = 6.0  # four, and what the bend of the motion adds
 _ANGLES = ("roll", "pitch", "yaw")
+_AS_FAST = 2.0
 _STEADY = ("position", "x", "y", "z")
 """What cannot step; torques, tensions and velocities can, or nearly."""
 
@@ -31,7 +35,7 @@ def outlier_suspicions(
     """
     found, rows = find_outliers(values, stamp_ns)
     seconds: Array = np.asarray((stamp_ns[rows] - origin_ns) * 1e-9, dtype=np.float64)
-    where, unit = channel.where, f" {channel.quantity}"
+    where = channel.where
     steady = channel.field.partition("/")[0] in _STEADY
     out = []
     if len(found.spikes) and (steady or _beyond_the_rest(values[rows], found.spikes)):
@@ -42,11 +46,41 @@ def outlier_suspicions(
         out.append(at_instants(where, "zero", text, seconds[found.zeros]))
     if found.period is not None and steady:
         out.append(_rollover(channel, found, seconds[found.jumps]))
-    elif len(found.jumps) and steady:
-        sizes = ", ".join(f"{size:+.6g}" for size in found.sizes[:SHOWN_SIZES])
-        text = f"{len(found.jumps)} steps that no motion explains, {sizes}{unit}: a reset?"
-        out.append(at_instants(where, "jump", text, seconds[found.jumps]))
+    elif steady:
+        out += _jumps(channel, found, values[rows], seconds)
     return out
+
+
+def _jumps(channel: Channel, found: Outliers, values: Array, seconds: Array) -> list[Suspicion]:
+    """Return steps that stay, but for those with which a held value is let go."""
+    let_go = np.array(
+        [
+            is_held(values, int(row)) and abs(size) <= _goes_on(values, int(row))
+            for row, size in zip(found.jumps, found.sizes, strict=True)
+        ],
+        dtype=np.bool_,
+    )
+    out = []
+    jumps, sizes = found.jumps[~let_go], found.sizes[~let_go]
+    if len(jumps):
+        shown = ", ".join(f"{size:+.6g}" for size in sizes[:SHOWN_SIZES])
+        text = f"{len(jumps)} steps that no motion explains, {shown} {channel.quantity}: a reset?"
+        out.append(at_instants(channel.where, "jump", text, seconds[jumps]))
+    if let_go.any() and channel.field not in "xyz":
+        text = f"its last value is held {let_go.sum()} times and then steps to where it is"
+        held = at_instants(channel.where, "stuck", text, seconds[found.jumps[let_go]])
+        out.append(replace(held, remedy="`drop` these stretches; never `jumps: join`"))
+    return out
+
+
+def _goes_on(values: Array, row: int) -> float:
+    """Return how far a signal may have moved while its value was held before a row."""
+    changes = np.flatnonzero(np.diff(values[:row]) != 0.0)
+    start = int(changes[-1]) + 1 if len(changes) else 0
+    steps = np.abs(np.diff(values))
+    beside = np.concatenate([steps[max(start - 5, 0) : start], steps[row : row + 5]])
+    largest = float(beside.max()) if len(beside) else 0.0
+    return _AS_FAST * largest * (row - start)
 
 
 def _beyond_the_rest(values: Array, spikes: NDArray[np.intp]) -> bool:

@@ -85,7 +85,7 @@ def outliers_of(values: Array, whole_steps: NDArray[np.bool_]) -> Outliers:
     if period is not None:
         jumps = np.flatnonzero(np.abs(steps) > _ROLLOVER_STEP * np.ptp(values))
         return Outliers(_EMPTY, _EMPTY, jumps + 1, steps[jumps], *period)
-    places, around = _impossible(steps)
+    places, around = impossible_steps(steps)
     return _sorted_out(values, steps, places, around)
 
 
@@ -126,7 +126,7 @@ def _steps_beside(steps: Array, at: Places) -> Array:
     return np.asarray(pair.sum(axis=0) / np.maximum((pair != 0.0).sum(axis=0), 1))
 
 
-def _impossible(steps: Array) -> tuple[Places, Array]:
+def impossible_steps(steps: Array) -> tuple[Places, Array]:
     """Return the places of impossible steps, and the usual size of the steps around each."""
     sizes = np.abs(steps)
     moving = sizes[sizes > 0]

@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from cspm_checks.kinematics import pose_shift
 from cspm_checks.lateness import Lateness, lateness
-from cspm_checks.series import Log, SensorSeries, TopicColumns, series_of
-from cspm_model.kernels.trajectory import eulers_along, lengths_along
-from cspm_model.parameters import nominal_parameters
+from cspm_checks.misfit import STATE, Winding
+from cspm_checks.poses import BAR
+from cspm_checks.series import Log, SensorSeries
 from cspm_msgs_py.testbed import Testbed
-from cspm_msgs_py.topics import POSE
 
 Array = NDArray[np.float64]
-STATE, BAR, FRAME = "/winches/state", "/bar/pose", "/winch_frame/pose"
 # Fewer give no error that is worth having.
 FEWEST_WINCHES = 3
 
@@ -32,49 +31,25 @@ def comparable(messages: Log, testbed: Testbed) -> bool:
     return angles and BAR in messages and cables >= FEWEST_WINCHES
 
 
-def pose_lateness(messages: Log, testbed: Testbed, origin_ns: int) -> Lateness | None:
+def pose_lateness(seen: Winding) -> Lateness | None:
     """Return how late poses are against the winches; None where the signals cannot tell.
 
     Args:
-        messages: what was imported, by topic; `comparable`.
-        testbed: the machine.
-        origin_ns: the instant from which times count [ns].
+        seen: what both say of the cables' lengths.
     """
-    time, lengths = _lengths(messages, testbed, origin_ns)
+    shift = pose_shift(seen)
+    since = shift.seconds if shift else 0.0
     found = []
-    for i, cable in enumerate(testbed.cables):
-        if cable.has_cable:
-            angle = series_of(messages[STATE], f"position/{cable.name}", origin_ns)
-            found.append(lateness(angle, SensorSeries(time, lengths[:, i]), [], (0,)))
+    for i, angle in enumerate(seen.angles):
+        lengths = SensorSeries(seen.bar.time - since, seen.lengths[:, i])
+        found.append(lateness(angle, lengths, [], (0,)))
     told = [late for late in found if late is not None]
-    return _of_all(told) if len(told) >= FEWEST_WINCHES else None
-
-
-def _lengths(messages: Log, testbed: Testbed, origin_ns: int) -> tuple[Array, Array]:
-    """Return instants of the bar's pose [s], shape (k,), and lengths there, shape (k, n) [m]."""
-    time, bar = _poses(messages[BAR], origin_ns)
-    frame = np.zeros_like(bar)
-    if FRAME in messages:
-        at, poses = _poses(messages[FRAME], origin_ns)
-        frame = np.stack([np.interp(time, at, column) for column in poses.T], axis=1)
-    cables = nominal_parameters(testbed).cables
-    lengths, bar_rates, frame_rates = np.empty((3, len(time), len(cables)))
-    still = np.zeros_like(bar)
-    lengths_along(cables, bar, frame, still, still, lengths, bar_rates, frame_rates)
-    return time, lengths
-
-
-def _poses(topic: TopicColumns, origin_ns: int) -> tuple[Array, Array]:
-    """Return instants [s], shape (k,), and poses with Euler angles, shape (k, 6)."""
-    rows, stamps = topic.rows(slice(None)), topic.stamp_ns
-    order = np.argsort(stamps, kind="stable")
-    order = order[~np.isnan(rows[order]).any(axis=1)]
-    rows = rows[order]
-    angles = np.empty((len(rows), 3))
-    eulers_along(np.ascontiguousarray(rows[:, POSE.index("qx") : POSE.index("qw") + 1]), angles)
-    angles = np.unwrap(angles, axis=0)
-    time = np.asarray((stamps[order] - origin_ns) * 1e-9, dtype=np.float64)
-    return time, np.ascontiguousarray(np.concatenate([rows[:, :3], angles], axis=1))
+    if len(told) >= FEWEST_WINCHES:
+        late = _of_all(told)
+        # Shifts of less than a sample that gain nothing count as none.
+        error = max(late.error, 0.5 * late.interval) if shift else late.error
+        return late._replace(seconds=late.seconds + since, error=error)
+    return Lateness(since, 2.0 * shift.step, 0.0, 0.0, shift.step) if shift else None
 
 
 def _of_all(winches: list[Lateness]) -> Lateness:

@@ -45,17 +45,19 @@ _LIKELY = {
 }
 
 
-def relation_suspicions(messages: Log, testbed: Testbed, poses: Lateness | None) -> list[Suspicion]:
+def relation_suspicions(
+    messages: Log, testbed: Testbed, poses: Lateness | None, origin_ns: int
+) -> list[Suspicion]:
     """Return which channels contradict each other.
 
     Args:
         messages: what was imported, by topic.
         testbed: the machine.
         poses: how late they are, if that can be said.
+        origin_ns: the instant from which times count [ns].
     """
     found: list[Suspicion] = []
-    origin = min(int(one.stamp_ns.min()) for one in messages.values())
-    for where, position, velocity in _position_pairs(messages, origin):
+    for where, position, velocity in _position_pairs(messages, origin_ns):
         found += velocity_suspicions(where, position, velocity)
         found += stuck_suspicions(where.replace("velocity", "position"), position, velocity)
         found += late_suspicions(where, "the position", lateness(velocity, position, [], (1,)))
@@ -65,7 +67,7 @@ def relation_suspicions(messages: Log, testbed: Testbed, poses: Lateness | None)
     if state is not None and "effort" in state.topic.parts:
         for cable in testbed.cables:
             rides = testbed.winch_frame is not None
-            found += _torque_relations(state, messages.get(_TENSION), cable, origin, rides=rides)
+            found += _torque_relations(state, messages.get(_TENSION), cable, origin_ns, rides=rides)
     return found
 
 
@@ -135,8 +137,11 @@ def late_suspicions(where: str, leader: str, late: Lateness | None) -> list[Susp
     """Return whether a channel is late against a leader."""
     if late is None or not late.matters:
         return []
-    milli, error = 1e3 * late.seconds, 1e3 * late.error
-    text = f"{abs(milli):.3g} ± {error:.2g} ms {'late' if milli > 0 else 'early'} against {leader}"
+    size, unit = (1e3, "ms") if abs(late.seconds) < 1.0 else (1.0, "s")
+    which = "late" if late.seconds > 0 else "early"
+    text = (
+        f"{size * abs(late.seconds):.4g} ± {size * late.error:.2g} {unit} {which} against {leader}"
+    )
     if late.drift:
         text += f", and drifts by {late.drift:.3g} ± {late.drift_error:.2g} s per s"
     numbers = {
@@ -145,7 +150,7 @@ def late_suspicions(where: str, leader: str, late: Lateness | None) -> list[Susp
         "drift": late.drift,
         "drift_error": late.drift_error,
     }
-    return [Suspicion(where, "late", text, numbers)]
+    return [Suspicion(where, "late", text, numbers, mend={where: {"offset_s": -late.seconds}})]
 
 
 def _position_pairs(

@@ -23,6 +23,11 @@ LASTING = {
     "coarse",
     "resolution",
     "smoothed",
+    "exchanged",
+    "factor",
+    "axes",
+    "kinematics",
+    "hum",
 }
 """Kinds that are of the whole recording; a stretch alone may be at rest, or move too little."""
 

@@ -15,6 +15,9 @@ LONGER = 20.0
 """How many times longer than the runs in which half of the samples are."""
 _MOVED = 0.02
 """Of the range of a position: what speed says that it moved meanwhile."""
+HELD = 4
+"""Samples equal to the last digit in all columns at once: noise makes no two."""
+_RARE = 0.2
 _SHOWN = 10
 
 
@@ -37,6 +40,42 @@ def frozen_suspicions(where: str, rows: Array, seconds: Array) -> list[Suspicion
     first, length = _runs((np.diff(rows, axis=0) != 0.0).any(axis=1))
     hit = (length >= SHORTEST) & (length > LONGER * _usual(length)) & rows[first].any(axis=1)
     return _told(where, "", seconds[first[hit]], _lasting(seconds, first[hit], length[hit]))
+
+
+def held_frames(where: str, rows: Array, seconds: Array) -> list[Suspicion]:
+    """Return where a sensor that changes at every sample holds its last for some: frames lost.
+
+    Args:
+        where: the topic.
+        rows: its values, of which several change at once, shape (n, width).
+        seconds: when, shape (n,).
+    """
+    if len(rows) < 2 * SHORTEST:
+        return []
+    first, length = _runs((np.diff(rows, axis=0) != 0.0).any(axis=1))
+    hit = (length >= HELD) & (length < SHORTEST) & rows[first].any(axis=1)
+    if not hit.any() or _usual(length) > 1 or length[length > 1].sum() > _RARE * len(rows):
+        return []
+    ends = first[hit] + length[hit] - 1
+    lost, count = int((length[hit] - 1).sum()), int(hit.sum())
+    pairs = [(float(seconds[a]), float(seconds[b])) for a, b in zip(first[hit], ends, strict=True)]
+    stretches = ", ".join(f"{start:.6g} to {end:.6g} s" for start, end in pairs[:3])
+    text = f"its last value is held {count} times, for {length[hit].max()} samples at most, and"
+    text += " then steps to where it is: frames lost"
+    remedy = f"`drop` {stretches}{f' and {count - 3} more' * (count > 3)}: {lost} of {len(rows)}"
+    remedy += " messages; never `jumps: join`"
+    half = float(np.median(np.diff(seconds))) / 2.0
+    mend = {where: {"drop": [[start + half, end + half] for start, end in pairs]}}
+    numbers = {"count": float(count), "samples": float(lost)}
+    at = tuple(start for start, _ in pairs[:_SHOWN])
+    return [Suspicion(where, "stuck", text, numbers, at, remedy, mend)]
+
+
+def is_held(values: Array, row: int) -> bool:
+    """Return whether a sample comes after some that are equal, in a signal that else changes."""
+    before = values[max(row - HELD, 0) : row]
+    still = float(np.mean(np.diff(values) == 0.0))
+    return len(before) == HELD and not np.ptp(before) and still < _RARE
 
 
 def stuck_suspicions(where: str, position: SensorSeries, velocity: SensorSeries) -> list[Suspicion]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from cspm_checks.catalogue import CHECKS
 
@@ -18,6 +19,9 @@ class Suspicion:
         numbers: behind the text, SI.
         at_s: the first instants where it shows, from the first stamp of all [s].
         remedy: what repairs it, as a rule that of its kind.
+        mend: the same for programs, by topic and field: `of` names the field whose source it is,
+            `sign` and `scale` multiply, `offset_s` is added to its clock, the rest
+            are keys of a mapping.
     """
 
     where: str
@@ -26,6 +30,7 @@ class Suspicion:
     numbers: dict[str, float] = field(default_factory=dict)
     at_s: tuple[float, ...] = ()
     remedy: str = ""
+    mend: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Take the remedy of the kind."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_checks.channel import Channel
+from cspm_checks.drive_limit import limit_text, limited_share
 from cspm_checks.suspicion import Suspicion
 from cspm_msgs_py.sensor_spec import MEASURED, quantities
 from cspm_msgs_py.testbed import Cable, Testbed
@@ -53,9 +54,11 @@ def value_suspicions(channel: Channel, values: Array, testbed: Testbed) -> list[
             return []
         text = f"constant at {values[0]:.6g}{f' {quantity}' if quantity != '1' else ''}"
         return [Suspicion(where, "constant", text, {"value": float(values[0])})]
-    found = []
+    found, limit = [], _known_limit(topic, field, testbed)
     if "effort" in field or "velocity" in field:
-        found += _saturated(where, quantity, values, _known_limit(topic, field, testbed))
+        found += _saturated(where, quantity, values, limit)
+    if text := limit_text(limited_share(values, limit), limit):
+        found.append(Suspicion(where, "limit", text, {"share": limited_share(values, limit)}))
     found += _coarse(where, topic, field, quantity, values, testbed)
     return found + _implausible(where, topic, field, quantity, values, testbed)
 

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_checks.poses import elastic_range
 from cspm_ident.estimation import Estimate, Interval, Parameter, Record, fit_linear
 from cspm_ident.estimation.objection import Objection, sign_objections
-from cspm_ident.lengths.length_rows import LengthRows, elastic_change, length_rows
+from cspm_ident.lengths.length_rows import LengthRows, length_rows
 from cspm_ident.recording_roles import check_roles
 from cspm_ident.signals.measurement import Measurement
 from cspm_msgs_py.errors import InputError
@@ -129,7 +130,7 @@ def identify_lengths(
             f"{searched[0].path}: no winch moves, allowed: recordings in which one does"
         )
     mean = np.average([rows.lengths.mean(axis=0) for rows in own], axis=0)
-    stretch = elastic_change(searched[0], mean)
+    stretch = elastic_range(searched[0].machine, mean)
     cables = tuple(
         _cable(i, names[i], searched, held_out, found, float(stretch[i])) for i in moving
     )

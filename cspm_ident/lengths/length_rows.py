@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from cspm_ident.signals.cable_motion import cable_motion
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.timeline import Timeline
-from cspm_model.elastic_law import elongation_at
-from cspm_model.kernels.cable import OFFSET_LENGTH, RADIUS
+from cspm_model.kernels.cable import RADIUS
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.errors import InputError
 
@@ -102,17 +101,3 @@ def _turned(angles: Array, point: Array) -> Array:
     across = cr * y - sr * z
     down = -sp * x + cp * (sr * y + cr * z)
     return np.stack([cy * tilted - sy * across, sy * tilted + cy * across, down], axis=1)
-
-
-def elastic_change(measurement: Measurement, lengths: Array) -> Array:
-    """Return by how much cables may stretch between their tension limits, (n,) [m].
-
-    Args:
-        measurement: of the machine.
-        lengths: mean lengths, (n,) [m].
-    """
-    parameters = nominal_parameters(measurement.machine)
-    limits = np.array([cable.tension_limits or (0.0, 0.0) for cable in measurement.machine.cables])
-    elastic = np.tile(lengths + parameters.cables[:, OFFSET_LENGTH], (2, 1))
-    low, high = elongation_at(parameters, np.ascontiguousarray(limits.T), elastic)
-    return np.asarray(high - low)

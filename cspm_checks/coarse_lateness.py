@@ -20,7 +20,7 @@ SURE = 0.95
 0.96; what moves otherwise stays below 0.8."""
 GAIN = 0.1
 """What the best shift has to correlate more than none at all."""
-OPPOSITE = -0.8
+OPPOSITE = -0.3
 """Without a shift: a wrong sign, which a motion that repeats hides half a period later."""
 AVERAGE_S = 0.2
 """Noise, inertia and what a loop makes of it are faster: the mean of so long is what counts."""
@@ -78,7 +78,7 @@ def coarse_shift(
     tops = [int(each[np.argmax(found[each])]) for each in groups]
     top = min(tops, key=lambda i: abs(seconds[i]))
     none = float(np.interp(0.0, seconds, np.nan_to_num(found)))
-    if found[top] - none < GAIN or none < OPPOSITE:
+    if found[top] - none < GAIN or (len(tops) > 1 and none < OPPOSITE):
         return None
     return CoarseShift(_between(seconds, found, top), step, float(found[top]), none, len(tops) - 1)
 

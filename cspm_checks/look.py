@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_checks.acceleration import acceleration_suspicions
-from cspm_checks.attitude import attitude_suspicions
 from cspm_checks.channel import Channel
 from cspm_checks.clocks import overlap_suspicions
 from cspm_checks.hum import hum_suspicions
-from cspm_checks.machine_suspicions import machine_suspicions
-from cspm_checks.misfit import winding
+from cspm_checks.machine.attitude import attitude_suspicions
+from cspm_checks.machine.machine_suspicions import machine_suspicions
+from cspm_checks.machine.misfit import winding
+from cspm_checks.machine.pose_lateness import comparable, pose_lateness
+from cspm_checks.machine.poses import poses_of
 from cspm_checks.outlier_suspicions import outlier_suspicions
 from cspm_checks.pace import pace_of
-from cspm_checks.pose_lateness import comparable, pose_lateness
-from cspm_checks.poses import poses_of
 from cspm_checks.relations import relation_suspicions
 from cspm_checks.series import Log, TopicColumns, series_of
 from cspm_checks.stretches import joined, stretches

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_checks.poses import elastic_range
+from cspm_checks.machine.poses import elastic_range
 from cspm_ident.estimation import Estimate, Interval, Parameter, Record, fit_linear
 from cspm_ident.estimation.objection import Objection, sign_objections
 from cspm_ident.lengths.length_rows import LengthRows, length_rows

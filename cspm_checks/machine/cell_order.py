@@ -58,6 +58,9 @@ def cell_suspicions(log: Log, testbed: Testbed, origin_ns: int) -> list[Suspicio
         explains = left[:, i, j, signs[i]] < np.sqrt(1.0 - EXPLAINED) * free
         if (share > LESS).any() or not explains.all():
             return []
+        # Inertia and friction that turn round with it say that it is the torque's sign.
+        if signs[i] and not _is_passive(drives[i], int(j)):
+            return []
         found.append((i, int(j), int(signs[i]), float(usual[i, i]), float(np.median(share))))
     mutual = [bool(order[each[1]] == each[0]) for each in found]
     return [
@@ -132,6 +135,15 @@ def _alone(drive: _Drive, part: int) -> float:
     """Return what a part of a torque leaves without any cell [N·m]."""
     rows = _rows(drive, part)
     return float(_rest(drive.motion[rows], drive.torque[rows, None])[0])
+
+
+def _is_passive(drive: _Drive, cell: int) -> bool:
+    """Return whether inertia and friction are positive with a cell's tension negated."""
+    goal = drive.torque + drive.pulls[:, cell]
+    inertia, viscous, dry, _ = np.linalg.lstsq(drive.motion, goal, rcond=None)[0]
+    spin, speed, direction, _ = drive.motion.T
+    taken = float(np.mean((viscous * speed + dry * direction) * speed)) / float(np.std(speed))
+    return bool(inertia * float(np.std(spin)) + taken > 0.0)
 
 
 def _rows(drive: _Drive, part: int) -> slice:

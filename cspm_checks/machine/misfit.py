@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_checks.poses import (
+from cspm_checks.machine.poses import (
     Poses,
     bodies,
     cable_lengths,

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from cspm_checks.kinematics import pose_shift
 from cspm_checks.lateness import Lateness, lateness
-from cspm_checks.misfit import STATE, Winding
-from cspm_checks.poses import BAR
+from cspm_checks.machine.kinematics import pose_shift
+from cspm_checks.machine.misfit import STATE, Winding
+from cspm_checks.machine.poses import BAR
 from cspm_checks.series import Log, SensorSeries
 from cspm_msgs_py.testbed import Testbed
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from cspm_checks.machine.poses import Poses
 from cspm_checks.outlier_suspicions import at_instants
 from cspm_checks.outliers import impossible_steps
-from cspm_checks.poses import Poses
 from cspm_checks.stuck import is_held
 from cspm_checks.suspicion import Suspicion
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cspm_checks.poses import ANGLES, Poses, poses
+from cspm_checks.machine.poses import ANGLES, Poses, poses
 
 Array = NDArray[np.float64]
 Both = tuple[Poses, Poses | None]

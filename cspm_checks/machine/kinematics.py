@@ -10,10 +10,10 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from cspm_checks.coarse_lateness import CoarseShift, coarse_shift
-from cspm_checks.encoder_order import encoder_faults, late_reversals
-from cspm_checks.misfit import Winding, scatter
-from cspm_checks.pose_readings import Reading, readings
-from cspm_checks.poses import BAR, FRAME, Poses, poses
+from cspm_checks.machine.encoder_order import encoder_faults, late_reversals
+from cspm_checks.machine.misfit import Winding, scatter
+from cspm_checks.machine.pose_readings import Reading, readings
+from cspm_checks.machine.poses import BAR, FRAME, Poses, poses
 from cspm_checks.suspicion import Suspicion
 
 Array = NDArray[np.float64]

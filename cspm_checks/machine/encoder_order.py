@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from cspm_checks.misfit import STATE, Winding, scatter
+from cspm_checks.machine.misfit import STATE, Winding, scatter
 from cspm_checks.suspicion import Suspicion
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_checks.machine.poses import Poses
 from cspm_checks.motion import smoothed
-from cspm_checks.poses import Poses
 from cspm_checks.series import SensorSeries
 from cspm_model.kernels.kinematics import cable_geometry
 from cspm_model.parameters import nominal_parameters

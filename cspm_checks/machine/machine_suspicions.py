@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_checks.cell_drift import cell_drift
-from cspm_checks.cell_order import STATE, TENSION, cell_suspicions
 from cspm_checks.coarse_lateness import coarse_shift
-from cspm_checks.kinematics import kinematic_suspicions
 from cspm_checks.lateness import LONGEST_S
-from cspm_checks.misfit import Winding
-from cspm_checks.poses import bodies
+from cspm_checks.machine.cell_drift import cell_drift
+from cspm_checks.machine.cell_order import STATE, TENSION, cell_suspicions
+from cspm_checks.machine.kinematics import kinematic_suspicions
+from cspm_checks.machine.misfit import Winding
+from cspm_checks.machine.poses import bodies
 from cspm_checks.series import Log, SensorSeries, series_of
 from cspm_checks.suspicion import Suspicion
 from cspm_msgs_py.testbed import Testbed

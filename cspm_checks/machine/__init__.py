@@ -1,0 +1,1 @@
+"""What contradicts the machine: encoders, poses, load cells and torques against each other."""

@@ -182,8 +182,15 @@ CHECKS: dict[str, Check] = {
         "times that were stored in single precision: steps are rounded by more than 1 %",
         "`rate` in the clock, or times in double precision",
     ),
-    "duplicate": Check("stamps that repeat", "`disorder: drop` in the clock"),
-    "backwards": Check("time that runs backwards", "`disorder: drop`, `wrap` of the clock, `drop`"),
+    "duplicate": Check(
+        "stamps that repeat",
+        "`disorder: drop` in the clock where it costs a hundredth at most; else `rate`, in a bag"
+        " `stamp: log`",
+    ),
+    "backwards": Check(
+        "time that runs backwards",
+        "likewise; `wrap` of the clock; times with their zone where local time was put back",
+    ),
     "rate": Check(
         "more messages than the test-bed's sensor delivers, or so few that the next smaller unit"
         " of time would do",

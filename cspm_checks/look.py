@@ -93,7 +93,7 @@ def _of_topic(columns: TopicColumns, testbed: Testbed, origin_ns: int) -> list[S
     name = columns.topic.name
     sensor = testbed.sensors.get(name)
     pace = pace_of(columns.stamp_ns, origin_ns)
-    found = time_suspicions(name, pace, sensor.rate if sensor else None)
+    found = time_suspicions(name, columns.stamp_ns, pace, sensor.rate if sensor else None)
     head = columns.rows(slice(_HELD_SAMPLE))
     found += _held(columns, head)
     if "qw" in columns.topic.fields:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_checks.disorder import order_of
 from cspm_checks.pace import GAP, JITTERED_GAP, Pace
+from cspm_checks.series import Stamps
 from cspm_checks.suspicion import Suspicion
 
 RATE_TOLERANCE = 0.01
@@ -18,12 +20,15 @@ _REGULAR = 0.8  # share of equal distances between events
 _EVENTS = 20
 
 
-def time_suspicions(topic: str, pace: Pace, sensor_rate: float | None) -> list[Suspicion]:
+def time_suspicions(
+    topic: str, stamp_ns: Stamps, pace: Pace, sensor_rate: float | None
+) -> list[Suspicion]:
     """Return what looks wrong in a topic's stamps.
 
     Args:
         topic: its name.
-        pace: its stamps.
+        stamp_ns: its stamps, shape (n,).
+        pace: what they look like.
         sensor_rate: the highest rate that the test-bed's sensor delivers [Hz], if it says so.
     """
     found = []
@@ -31,10 +36,7 @@ def time_suspicions(topic: str, pace: Pace, sensor_rate: float | None) -> list[S
     def add(kind: str, text: str, **numbers: float) -> None:
         found.append(Suspicion(topic, kind, text, numbers))
 
-    if pace.backwards:
-        add("backwards", f"time runs backwards {pace.backwards} times", count=pace.backwards)
-    if pace.duplicates:
-        add("duplicate", f"{pace.duplicates} stamps stand twice", count=pace.duplicates)
+    found += _disorder(topic, stamp_ns, pace)
     if pace.gaps and pace.step_s and pace.gap_at_s is not None:
         _, median, longest = pace.step_s
         least = JITTERED_GAP if pace.jitter_s else GAP
@@ -66,6 +68,23 @@ def time_suspicions(topic: str, pace: Pace, sensor_rate: float | None) -> list[S
     if sensor_rate and pace.rate_hz and (text := _rate(pace.rate_hz, sensor_rate)):
         add("rate", text, found=pace.rate_hz, sensor=sensor_rate)
     return found
+
+
+def _disorder(topic: str, stamp_ns: Stamps, pace: Pace) -> list[Suspicion]:
+    """Return whether stamps do not rise, with the remedy that loses least."""
+    texts = {
+        "backwards": (pace.backwards, f"time runs backwards {pace.backwards} times"),
+        "duplicate": (pace.duplicates, f"{pace.duplicates} stamps stand twice"),
+    }
+    if not (pace.backwards or pace.duplicates):
+        return []
+    order = order_of(stamp_ns)
+    mend = {topic: {"clock": order.keys}} if order.keys else {}
+    return [
+        Suspicion(topic, kind, text, {"count": count}, remedy=order.remedy, mend=mend)
+        for kind, (count, text) in texts.items()
+        if count
+    ]
 
 
 def _rate(found: float, sensor: float) -> str:

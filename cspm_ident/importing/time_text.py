@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 _EPOCH = date(1970, 1, 1).toordinal()
 _SECOND = 1_000_000_000
 _DAY = 86400 * _SECOND
-_CLOCK = r"(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,](\d{1,9}))?)?"
+_CLOCK = r"(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,](\d{1,9}))?)?(?: ?([AaPp])\.?[Mm]\.?)?"
 _ZONE = r"(Z|[+-]\d\d:?\d\d)?"
 _TIME_OF_DAY = re.compile(rf"{_CLOCK}$")
 _PART = rf"(?:[T ]+{_CLOCK}{_ZONE})?$"
@@ -69,11 +69,11 @@ def _parser(unit: str) -> Callable[[str], int]:
         match = pattern.match(cell)
         if match is None:
             raise ValueError(cell)
-        *numbers, hour, minute, second, fraction, zone = match.groups()
+        *numbers, hour, minute, second, fraction, half, zone = match.groups()
         key = tuple(numbers)
         if key not in known:
             known[key] = _days(int(numbers[year]), int(numbers[month]), int(numbers[day]), cell)
-        since = 0 if hour is None else _since_midnight(cell, hour, minute, second, fraction)
+        since = 0 if hour is None else _since_midnight(cell, hour, minute, second, fraction, half)
         return known[key] * _DAY + since - _shift(zone)
 
     return parse
@@ -90,17 +90,21 @@ def _time_of_day(cell: str) -> int:
     match = _TIME_OF_DAY.match(cell)
     if match is None:
         raise ValueError(cell)
-    hour, minute, second, fraction = match.groups()
-    return _since_midnight(cell, hour, minute, second, fraction)
+    hour, minute, second, fraction, half = match.groups()
+    return _since_midnight(cell, hour, minute, second, fraction, half)
 
 
 def _since_midnight(
-    cell: str, hour: str, minute: str, second: str | None, fraction: str | None
+    cell: str, hour: str, minute: str, second: str | None, fraction: str | None, half: str | None
 ) -> int:
     # 60 is a leap second.
     if int(hour) > 23 or int(minute) > 59 or int(second or 0) > 60:
         raise ValueError(cell)
-    whole = (int(hour) * 60 + int(minute)) * 60 + int(second or 0)
+    if half is not None and not 1 <= int(hour) <= 12:
+        raise ValueError(cell)
+    # Noon and midnight are 12.
+    hours = int(hour) if half is None else int(hour) % 12 + 12 * (half in "pP")
+    whole = (hours * 60 + int(minute)) * 60 + int(second or 0)
     return whole * _SECOND + int((fraction or "0").ljust(9, "0"))
 
 

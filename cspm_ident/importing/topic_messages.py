@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from cspm_checks.disorder import order_of
 from cspm_ident.importing.column_series import ColumnSeries
 from cspm_ident.importing.column_store import release
 from cspm_ident.importing.import_plan import ANGLES, PlannedTopic
@@ -192,10 +193,11 @@ def _in_order(
     if "refuse" in policies:
         if trial:
             return keep, 0
-        at = (int(stamps[late[0]]) - origin_ns) * 1e-9
+        at, order = (int(stamps[late[0]]) - origin_ns) * 1e-9, order_of(stamps[keep])
         raise InputError(
-            f"{where}: {len(late)} stamps not later than one before, the first at {at:.9g} s,"
-            " allowed: rising stamps, or disorder: drop or keep in its clock"
+            f"{where}: {len(late)} stamps not later than one before, the first of message"
+            f" {late[0] + 1} at {at:.9g} s, allowed: rising stamps, {order.remedy},"
+            " or disorder: keep"
         )
     keep = keep.copy()
     keep[late] = False

@@ -71,9 +71,19 @@ def unit_of(name: str, where: str) -> Unit:
     Raises:
         InputError: there is no such unit.
     """
-    if name not in _UNITS:
+    if not is_unit(name):
         raise InputError(f"{where}: unit '{name}', allowed: {', '.join(_UNITS)}")
-    return _UNITS[name]
+    return _UNITS[_one_sign(name)]
+
+
+def is_unit(name: str) -> bool:
+    """Return whether there is a unit of that name."""
+    return _one_sign(name) in _UNITS
+
+
+def _one_sign(name: str) -> str:
+    """Return a name of a unit with the prefix and signs that are written here."""
+    return name.replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b2", "^2")
 
 
 def units_for(quantity: str) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ import gzip
 import re
 import zlib
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, TextIO, cast
 
@@ -18,12 +19,14 @@ from cspm_ident.importing.mapping import CsvFormat
 from cspm_ident.importing.sources.row_choice import Labels
 from cspm_ident.importing.sources.row_shape import RowShape
 from cspm_ident.importing.sources.source import Progress
+from cspm_ident.importing.sources.table_end import TableEnd
+from cspm_ident.importing.sources.table_head import table_head
 from cspm_ident.importing.sources.table_source import TableSource
+from cspm_ident.importing.sources.text_encoding import encoding_of
 from cspm_ident.importing.sources.time_cells import TimeCells
 from cspm_msgs_py.errors import InputError
 
 PIECE = 1 << 23  # characters read at once
-_DELIMITERS = (",", ";", "\t", "|")
 _TIME_CELL = 40  # characters
 _PACKED = 4  # times shorter, for the progress shown
 Lines = list[str]
@@ -51,20 +54,21 @@ class CsvSource(TableSource):
         """
         super().__init__(path)
         self._form, self._packed = form, packed
-        self._first = form.first_line or form.names_line + 1
-        with self._open() as file:
-            lines = _first_lines(file, self._first, path)
-        head = lines[form.names_line - 1] if form.names_line else lines[-1]
-        head = head.removeprefix(form.comment)
-        self._delimiter = self._find_delimiter(head)
+        self._encoding = encoding_of(path, form, packed=packed)
+        try:
+            with self._open() as file:
+                head = table_head(file, form, path)
+        except UnicodeDecodeError as err:
+            raise InputError(_undecodable(path, err)) from None
+        self._first, self._delimiter = head.first, head.delimiter
+        self.notes += head.notes
         if form.decimal == "," and self._delimiter == ",":
             raise InputError(f"{mapping_path}: csv.delimiter: ',' is the decimal mark as well")
-        cells = [cell.strip() for cell in self._cells(head)]
-        if not form.names_line:
-            cells = [str(i + 1) for i in range(len(cells))]
-        self.columns = form.names or tuple(cells)
+        numbered = tuple(str(i + 1) for i in range(len(head.cells)))
+        self.columns = form.names or (tuple(head.cells) if form.names_line else numbered)
         self._width = len(self.columns)
         self._rows = RowShape(path, self.columns, self._delimiter, form)
+        self._ends = TableEnd(self._rows, self._width, self.notes)
 
     def _store(
         self,
@@ -88,7 +92,7 @@ class CsvSource(TableSource):
                 for place, name in places.items():
                     piece = table[str(place)]
                     if place in clocks:
-                        piece = clocks[place].read(piece, line)
+                        piece = clocks[place].read(piece, partial(self._line_of, lines, line))
                     store.append(name, piece)
                 done += sum(map(len, lines))
                 progress(min(done / total, 1.0))
@@ -102,24 +106,15 @@ class CsvSource(TableSource):
         if self._rows.trailing:
             self.notes.append(f"{self._rows.trailing} rows end with empty cells, left out")
 
-    def _open(self) -> TextIO:
-        encoding = self._form.encoding
-        # Spreadsheets put a mark before their text, which is no part of the first name.
-        encoding = "utf-8-sig" if encoding.lower() in ("utf-8", "utf8") else encoding
-        if self._packed:
-            return cast("TextIO", gzip.open(self.path, "rt", encoding=encoding, errors="strict"))
-        return self.path.open(encoding=encoding, errors="strict", newline=None)
+    def _line_of(self, lines: Lines, line: int, row: int) -> int:
+        """Return the number of the line that holds a row of a piece."""
+        full = [i for i, text in enumerate(lines) if not self._rows.is_void(text)]
+        return line + full[row]
 
-    def _find_delimiter(self, head: str) -> str | None:
-        if self._form.delimiter is not None:
-            return None if self._form.delimiter == "blank" else self._form.delimiter
-        found = max(_DELIMITERS, key=head.count)
-        if head.count(found) == 0:
-            blank = len(head.split()) > 1
-            self.notes.append(f"cells are separated by {'blanks' if blank else 'nothing'}")
-            return None if blank else ","
-        self.notes.append(f"cells are separated by {found!r}, by its first line")
-        return found
+    def _open(self) -> TextIO:
+        if self._packed:
+            return cast("TextIO", gzip.open(self.path, "rt", encoding=self._encoding))
+        return self.path.open(encoding=self._encoding, newline=None)
 
     def _cells(self, line: str) -> list[str]:
         if self._delimiter is None:
@@ -133,14 +128,16 @@ class CsvSource(TableSource):
             for _ in range(self._first - 1):
                 file.readline()
                 line += 1
-            while lines := file.readlines(PIECE):
+            lines = file.readlines(PIECE)
+            while lines:
+                after = file.readlines(PIECE)
                 following = line + len(lines)
-                if not lines[-1].endswith("\n") and len(self._cells(lines[-1])) < self._width:
-                    self.notes.append(f"line {following - 1}, the last, is cut short and left out")
-                    lines.pop()
+                lines = self._ends.plain(lines, line)
+                if not after:
+                    lines = self._ends.without_end(lines, line)
                 if lines:
                     yield line, lines
-                line = following
+                line, lines = following, after
         except UnicodeDecodeError as err:
             raise InputError(_undecodable(self.path, err)) from None
         except (EOFError, zlib.error, gzip.BadGzipFile) as err:
@@ -217,18 +214,11 @@ class CsvSource(TableSource):
                     )
 
 
-def _first_lines(file: TextIO, count: int, path: Path) -> Lines:
-    try:
-        lines = [line for line in (file.readline() for _ in range(count)) if line]
-    except UnicodeDecodeError as err:
-        raise InputError(_undecodable(path, err)) from None
-    if len(lines) < count:
-        raise InputError(f"{path}: {len(lines)} lines, allowed: numbers from line {count} on")
-    return lines
-
-
 def _undecodable(path: Path, err: UnicodeDecodeError) -> str:
-    return f"{path}: no {err.encoding} text ({err.reason}), allowed: as csv.encoding says"
+    return (
+        f"{path}: no {err.encoding} text ({err.reason}), allowed: as csv.encoding says; programs of"
+        " Windows often write cp1252"
+    )
 
 
 def _is_number(text: str) -> bool:

@@ -85,7 +85,7 @@ class LoadedTable(TableSource):
                 )
             return vector.astype(np.longdouble)
         cells = TimeCells(self.path, name, unit)
-        found = cells.read(np.array([str(cell) for cell in vector]), 1)
+        found = cells.read(np.array([str(cell) for cell in vector]), lambda row: row + 1)
         if cells.unit is not None:
             self.time_units[name] = cells.unit
         return found

@@ -16,6 +16,7 @@ from cspm_ident.importing.sources.mat_source import MatSource
 from cspm_ident.importing.sources.parquet_source import ParquetSource
 from cspm_ident.importing.sources.source import Source
 from cspm_ident.importing.sources.spreadsheet_source import SpreadsheetSource
+from cspm_ident.importing.sources.text_encoding import refuse_binary
 from cspm_msgs_py.errors import InputError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -73,10 +74,7 @@ def _opened(path: Path, form: CsvFormat, where: str) -> Source:
     packed = start.startswith(_GZIP)
     if packed:
         start = _unpacked_start(path)
-    wide = form.encoding.lower().replace("_", "-").startswith("utf-16")
-    if b"\x00" in start and not wide:
-        inside = " inside" if packed else ""
-        raise InputError(f"{path}: no text{inside}, {ALLOWED}")
+    refuse_binary(path, start, form, " inside" if packed else "", ALLOWED)
     return CsvSource(path, form, where, packed=packed)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -48,8 +48,10 @@ class Labels:
         """Begin without any text."""
         self.known: list[str] = []
 
-    def read(self, cells: NDArray[np.str_], line: int = 1) -> NDArray[np.int32]:
-        """Return the number of each cell's text, shape (n,), of cells (n,); `line` has no use."""
+    def read(
+        self, cells: NDArray[np.str_], line_of: Callable[[int], int] | None = None
+    ) -> NDArray[np.int32]:
+        """Return the number of the text of each cell, (n,) both; `line_of` has no use."""
         texts, places = np.unique(cells, return_inverse=True)
         numbers = np.array([self._number(plain(str(text))) for text in texts], dtype=np.int32)
         return numbers[places]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -29,12 +30,14 @@ class TimeCells:
         """Whether its cells are texts, as far as is known."""
         return self.unit in TEXT_UNITS
 
-    def read(self, cells: NDArray[np.str_], line: int) -> NDArray[np.longdouble]:
+    def read(
+        self, cells: NDArray[np.str_], line_of: Callable[[int], int]
+    ) -> NDArray[np.longdouble]:
         """Return a piece as numbers of the unit, texts in ns, shape (n,).
 
         Args:
             cells: shape (n,).
-            line: number of the first, for errors.
+            line_of: returns the number of the line of a cell, for errors.
 
         Raises:
             InputError: a cell is not of the unit, or of none that is known.
@@ -44,25 +47,27 @@ class TimeCells:
                 blank = np.char.strip(cells) == ""
                 found = np.where(blank, "nan", cells).astype(np.longdouble)
             except ValueError:
-                self._find_unit(cells, line)
+                self._find_unit(cells, line_of)
             else:
                 self._numbers |= bool((~np.isnan(found)).any())
                 return np.asarray(found)
         try:
             return nanoseconds(str(self.unit), (cell.strip() for cell in cells.tolist()))
         except ValueError as err:
-            raise InputError(self._refusal(str(err), line)) from None
+            at = next(i for i, cell in enumerate(cells.tolist()) if cell.strip() == str(err))
+            raise InputError(self._refusal(str(err), line_of(at))) from None
 
-    def _find_unit(self, cells: NDArray[np.str_], line: int) -> None:
+    def _find_unit(self, cells: NDArray[np.str_], line_of: Callable[[int], int]) -> None:
         """Take the unit of texts that can be of one only."""
-        first = next(cell.strip() for cell in cells.tolist() if not _is_number(cell))
+        known = enumerate(cell.strip() for cell in cells.tolist())
+        at, first = next((i, cell) for i, cell in known if cell and not _is_number(cell))
         found = None if self._numbers else unit_of_text(first)
         if self.unit is not None or found is None:
-            raise InputError(self._refusal(first, line))
+            raise InputError(self._refusal(first, line_of(at)))
         self.unit = found
 
     def _refusal(self, cell: str, line: int) -> str:
-        where = f"{self._path}: column '{self._name}' from line {line}: '{cell}', allowed:"
+        where = f"{self._path}: line {line}, column '{self._name}': '{cell}', allowed:"
         if self.textual:
             return f"{where} a text as {TEXT_UNITS[str(self.unit)]} by unit {self.unit}"
         forms = ", ".join(f"{unit} ({example})" for unit, example in TEXT_UNITS.items())

@@ -100,9 +100,9 @@ def test_a_last_line_that_is_cut_short_is_reported(tmp_path):
             " fill takes the others as missing",
         ),
         (
-            "t,q\n0,1\nnoon,2\n",
+            "t,q\n0,1\nnoon,2\n2,3\n",
             "",
-            "a.csv: column 't' from line 2: 'noon', allowed: a number, or a text with its unit of:"
+            "a.csv: line 3, column 't': 'noon', allowed: a number, or a text with its unit of:"
             " iso8601 (2026-01-31T12:00:00.125), time_of_day (12:00:00.125), dd.mm.yyyy (31.01.2026"
             " 12:00:00.125), mm/dd/yyyy (01/31/2026 12:00:00.125)",
         ),
@@ -118,7 +118,7 @@ def test_a_last_line_that_is_cut_short_is_reported(tmp_path):
         ),
         ("t,q,q\n0,1,2\n", "", "a.csv: column 'q' occurs twice, allowed: each name once"),
         ("t,x\n0,1\n", "", "a.csv: no column 'q', allowed: t, x"),
-        ("t,q\n0,1\x00\n", "", f"a.csv: no text, {ALLOWED}"),
+        ("t,q\n0,1\x01\n", "", f"a.csv: no text, {ALLOWED}"),
     ],
 )
 def test_damaged_tables(tmp_path, text, form, reported):
@@ -128,7 +128,7 @@ def test_damaged_tables(tmp_path, text, form, reported):
 def test_a_wrong_encoding_is_reported(tmp_path):
     reported = fault(tmp_path, "t,q,Größe\n0,1,2\n", "encoding: utf-8", encoding="latin-1")
     assert reported.startswith("a.csv: no utf-8 text (")
-    assert reported.endswith("allowed: as csv.encoding says")
+    assert "allowed: as csv.encoding says; programs of Windows often write cp1252" in reported
 
 
 def test_pieces_of_a_long_table_are_the_whole(tmp_path, monkeypatch):

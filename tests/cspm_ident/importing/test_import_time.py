@@ -171,7 +171,8 @@ def test_stamps_out_of_order_are_refused_dropped_or_kept(tmp_path):
         imported(path, ALL % "")
     assert str(caught.value) == (
         f"{tmp_path}/mapping.yaml: channels./winches/state: 2 stamps not later than one before, the"
-        " first at 1 s, allowed: rising stamps, or disorder: drop or keep in its clock"
+        " first of message 3 at 1 s, allowed: rising stamps, times with all their digits, in a bag"
+        " `stamp: log`, or a `rate`; `disorder: drop` would lose 2 of 5 messages, or disorder: keep"
     )
     shown = imported(path, ALL % "", trial=True)
     assert {"backwards", "duplicate"} <= shown.kinds

@@ -140,7 +140,11 @@ def test_only_texts_of_one_meaning_have_a_unit_of_their_own():
             ["30.02.2026"],
             "'30.02.2026', allowed: a text as 31.01.2026 12:00:00.125 by unit dd.mm.yyyy",
         ),
-        ("column: t", ["0", "12:00:00"], "line 2: '0', allowed: a text as 12:00:00.125 by unit"),
+        (
+            "column: t",
+            ["0", "12:00:00"],
+            "line 2, column 't': '0', allowed: a text as 12:00:00.125 by unit",
+        ),
         (
             "column: [t, q]",
             ["0"],

@@ -151,6 +151,11 @@ CHECKS: dict[str, Check] = {
         " lag of the others",
         "nothing, or `stamp: log`",
     ),
+    "unlike_log": Check(
+        "stamps of headers that are off the times of the log, less a constant, by five steps and"
+        " 20 ms in a tenth of the messages: whole seconds, or nanoseconds that hold something else",
+        "`stamp: log` in the clock",
+    ),
     "late_part": Check(
         "a part of a JointState that the first messages have not; they are kept without it",
         "`drop` those messages, or leave the part out",

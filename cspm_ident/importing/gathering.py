@@ -8,12 +8,18 @@ from functools import partial
 import numpy as np
 
 from cspm_ident.importing.column_series import ColumnSeries
-from cspm_ident.importing.column_store import ColumnStore, pieces, release
+from cspm_ident.importing.column_store import PIECE, ColumnStore, pieces, release
 from cspm_ident.importing.import_plan import ImportPlan, PlannedField, PlannedTopic
 from cspm_ident.importing.joint_parts import without_empty_parts
 from cspm_ident.importing.mapping import Clock, MappingFile
 from cspm_ident.importing.mending import Mended, mend
-from cspm_ident.importing.time_base import Times, set_stamps, single_precision, times_of
+from cspm_ident.importing.time_base import (
+    Times,
+    set_stamps,
+    single_precision,
+    times_of,
+    unlike_log,
+)
 from cspm_ident.importing.topic_messages import Index, SkippedMessages, TopicMessages, gather
 from cspm_ident.importing.unwrapping import Unwrapper
 from cspm_msgs_py.errors import InputError
@@ -142,14 +148,16 @@ def _times(
             f"{where}: {len(raw[0])} times for {count} rows of column '{field.column}',"
             " allowed: one each"
         )
-    unset = 0
+    unset, unlike = 0, 0.0
     if field.logged is not None:
-        raw[0], unset = set_stamps(raw[0], store.column(field.logged), where)
+        logged = store.column(field.logged)
+        raw[0], unset = set_stamps(raw[0], logged, where)
+        unlike = unlike_log(raw[0][:PIECE], logged[:PIECE]) if count > 1 else 0.0
     rounded = max(
         (single_precision(one, unit) for one, unit in zip(raw, units, strict=True)), default=0.0
     )
     times = times_of(raw, count, clock, units, store, where)
-    return times._replace(unset=unset, rounded_s=rounded)
+    return times._replace(unset=unset, rounded_s=rounded, unlike_log_s=unlike)
 
 
 def _series(

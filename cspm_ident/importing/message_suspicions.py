@@ -31,6 +31,13 @@ def message_suspicions(
     if unset:
         text = f"{unset} stamps were never set (0) and are repaired from the time of the log"
         found.append(Suspicion(name, "unset", text, {"count": float(unset)}))
+    unlike = max(
+        (one.times.unlike_log_s for one in messages.series.values() if one.times), default=0
+    )
+    if unlike:
+        text = f"stamps of the headers and times of the log disagree by up to {unlike:.3g} s"
+        mend = {name: {"clock": {"stamp": "log"}}}
+        found.append(Suspicion(name, "unlike_log", text, {"largest": unlike}, mend=mend))
     rounded = max((one.times.rounded_s for one in messages.series.values() if one.times), default=0)
     step = pace.step_s[1] if pace.step_s else 0.0
     if rounded > ROUNDED * step > 0.0:

@@ -18,6 +18,7 @@ from cspm_msgs_py.layout import LATEST_SECOND
 from cspm_msgs_py.message import NANOSECONDS
 
 Stamps = NDArray[np.int64]
+_MOST_AGREE, _STEPS, _BUSY_S = 0.9, 5.0, 0.02
 
 
 class Times(NamedTuple):
@@ -30,6 +31,8 @@ class Times(NamedTuple):
         disorder: what the clock says of stamps that are not later than one before.
         unset: how many stamps nobody had set, and were taken from the time of their log.
         rounded_s: to what times stored in single precision were rounded [s]; 0 in double.
+        unlike_log_s: by how much stamps of headers and times of the log disagree [s]; see
+            `unlike_log`.
     """
 
     stamp_ns: Stamps
@@ -38,6 +41,7 @@ class Times(NamedTuple):
     disorder: str = "refuse"
     unset: int = 0
     rounded_s: float = 0.0
+    unlike_log_s: float = 0.0
 
     def equals(self, other: Times) -> bool:
         """Return whether the stamps of other rows are the same, and as trustworthy."""
@@ -82,6 +86,23 @@ def set_stamps(
     found = np.array(stamp_ns)
     found[rows[unset]] = guess[unset]
     return found, int(unset.sum())
+
+
+def unlike_log(stamp_ns: NDArray[Any], log_ns: NDArray[Any]) -> float:
+    """Return by how much headers' stamps and times of the log disagree, less a constant [s].
+
+    Messages are logged a little after they are stamped, and in bursts where a computer is busy. 0
+    where nine tenths of them agree within five steps and 20 ms.
+
+    Args:
+        stamp_ns: of the headers, longdouble, shape (n,).
+        log_ns: when each was logged, shape (n,).
+    """
+    late = (np.asarray(log_ns) - np.asarray(stamp_ns)).astype(np.float64) / NANOSECONDS
+    about = np.abs(late - np.median(late))
+    step = float(np.median(np.diff(np.asarray(log_ns, dtype=np.float64)))) / NANOSECONDS
+    disagree = np.quantile(about, _MOST_AGREE) > max(_STEPS * step, _BUSY_S)
+    return float(np.ptp(late)) if disagree else 0.0
 
 
 def single_precision(raw: NDArray[Any], unit: str) -> float:

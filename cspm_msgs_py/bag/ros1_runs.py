@@ -68,7 +68,7 @@ class Ros1Runs:
         """Open the bag and read its index.
 
         Raises:
-            InputError: it is not such a bag, was not closed, or is damaged.
+            InputError: it is not such a bag, or is damaged.
         """
         self.path = path
         self.faults: list[str] = []
@@ -97,15 +97,13 @@ class Ros1Runs:
         """Return the chunks; set `channels`."""
         if self._bytes(len(MAGIC), len(_VERSION)) != _VERSION:
             raise InputError(f"{self.path}: a ROS 1 bag of another format, allowed: V2.0")
-        head = self._record(len(MAGIC) + len(_VERSION), _BAG).fields
+        first = self._record(len(MAGIC) + len(_VERSION), _BAG)
+        head = first.fields
         if head.get(b"encryptor"):
             raise InputError(f"{self.path}: an encrypted bag, allowed: one that is not")
         (end,) = _UINT64.unpack(head[b"index_pos"])
         if end == 0:
-            raise InputError(
-                f"{self.path}: a ROS 1 bag that was not closed, allowed: one with an index"
-                " (`rosbag reindex` restores it)"
-            )
+            return self._scan(first)
         connections, infos = [], []
         for _ in range(_uint32(head[b"conn_count"])):
             connections.append(self._record(end, _CONNECTION))
@@ -123,6 +121,44 @@ class Ros1Runs:
             raise ValueError(f"messages on connection {min(unknown)}, which no record describes")
         return infos
 
+    def _scan(self, head: _Record) -> list[_ChunkInfo]:
+        """Return the whole chunks of a bag that was not closed; set `channels`."""
+        size, place = self.path.stat().st_size, head.end
+        infos: list[_ChunkInfo] = []
+        described: dict[int, _Fields] = {}
+        counts: Counter[int] = Counter()
+        while place < size:
+            try:
+                record = self._any_record(place)
+                if record.fields[b"op"] == _CHUNK:
+                    content = self._content(place)
+                    times = [(log, channel) for log, channel, _ in _messages(content)]
+                    found = dict(_connections(content))
+                elif record.end > size:
+                    break
+                else:
+                    place = record.end
+                    continue
+            except (struct.error, KeyError, ValueError, InputError):
+                break
+            described |= found
+            here = Counter(channel for _, channel in times)
+            if times and here.keys() <= described.keys():
+                infos.append(_ChunkInfo(place, min(times)[0], max(times)[0], dict(here)))
+                counts += here
+            place = record.end
+        if not infos:
+            raise InputError(
+                f"{self.path}: a ROS 1 bag that was not closed, and holds no whole chunk, allowed:"
+                " at least one"
+            )
+        self.channels = [_described(id_, about, counts) for id_, about in described.items()]
+        self.faults.append(
+            f"{self.path}: a ROS 1 bag that was not closed: {len(infos)} whole chunks with"
+            f" {counts.total()} messages are read, {size - place} bytes after them left out"
+        )
+        return infos
+
     def _bytes(self, offset: int, length: int) -> bytes:
         return read_at(self._file, offset, length, self.path)
 
@@ -132,27 +168,21 @@ class Ros1Runs:
         Raises:
             ValueError: it is not one of the kind `opcode`.
         """
+        record = self._any_record(offset)
+        if record.fields.get(b"op") != opcode:
+            raise ValueError(f"no record of kind {opcode[0]} at byte {offset}")
+        return record
+
+    def _any_record(self, offset: int) -> _Record:
         length = _uint32(self._bytes(offset, 4))
         if length > _LARGEST_HEADER:
             raise ValueError(f"no record at byte {offset}")
         header = self._bytes(offset + 4, length + 4)
-        fields = _fields(header[:-4])
-        if fields.get(b"op") != opcode:
-            raise ValueError(f"no record of kind {opcode[0]} at byte {offset}")
-        return _Record(fields, offset + 8 + length, _uint32(header[-4:]))
+        return _Record(_fields(header[:-4]), offset + 8 + length, _uint32(header[-4:]))
 
     def _channel(self, record: _Record, counts: Counter[int]) -> StoredChannel:
         about = _fields(self._bytes(record.data, record.length))
-        id_ = _uint32(record.fields[b"conn"])
-        return StoredChannel(
-            id=id_,
-            topic=record.fields[b"topic"].decode(),
-            ros_type=about[b"type"].decode(),
-            count=counts[id_],
-            encoding=ENCODING,
-            schema_encoding=ROS1_SCHEMA_ENCODING,
-            definition=about[b"message_definition"].decode(errors="replace"),
-        )
+        return _described(_uint32(record.fields[b"conn"]), record.fields | about, counts)
 
     def _read(
         self, info: _ChunkInfo, channels: Collection[int], start_ns: int
@@ -253,8 +283,35 @@ def _chunk_info(fields: _Fields, data: bytes) -> _ChunkInfo:
     return _ChunkInfo(place, first, last, dict(_TWO.iter_unpack(data)))
 
 
+def _described(id_: int, about: _Fields, counts: Counter[int]) -> StoredChannel:
+    return StoredChannel(
+        id=id_,
+        topic=about[b"topic"].decode(),
+        ros_type=about[b"type"].decode(),
+        count=counts[id_],
+        encoding=ENCODING,
+        schema_encoding=ROS1_SCHEMA_ENCODING,
+        definition=about[b"message_definition"].decode(errors="replace"),
+    )
+
+
 def _messages(content: bytes) -> Iterator[StoredMessage]:
-    """Yield the messages of a chunk's content as they stand in it.
+    """Yield the messages of a chunk's content as they stand in it."""
+    for fields, data in _records(content):
+        if fields[b"op"] == _MESSAGE:
+            yield _time_ns(fields[b"time"]), _uint32(fields[b"conn"]), data
+
+
+def _connections(content: bytes) -> Iterator[tuple[int, _Fields]]:
+    """Yield number and description of the connections in a chunk's content."""
+    for fields, data in _records(content):
+        if fields[b"op"] == _CONNECTION:
+            # The topic that the header names is the one that counts.
+            yield _uint32(fields[b"conn"]), {**_fields(data), b"topic": fields[b"topic"]}
+
+
+def _records(content: bytes) -> Iterator[tuple[_Fields, bytes]]:
+    """Yield header and data of a chunk's records.
 
     Raises:
         ValueError, struct.error, KeyError: it is not a sequence of records.
@@ -267,7 +324,5 @@ def _messages(content: bytes) -> Iterator[StoredMessage]:
         end = data + size
         if end > len(content):
             raise ValueError(f"a record of it ends {end - len(content)} bytes behind its end")
-        fields = _fields(content[offset + 4 : data - 4])
-        if fields[b"op"] == _MESSAGE:
-            yield _time_ns(fields[b"time"]), _uint32(fields[b"conn"]), content[data:end]
+        yield _fields(content[offset + 4 : data - 4]), content[data:end]
         offset = end

@@ -13,6 +13,9 @@ from cspm_ident.importing.sources.mat_source import EXPORT
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.installed.extra_library import extra_library
 
+LINEAR = {"scale_factor": 1.0, "add_offset": 0.0}
+HOLES = ("_FillValue", "missing_value")
+PACKING = (*LINEAR, *HOLES)
 _HIDDEN = ("#refs#", "#subsystem#")
 
 
@@ -72,7 +75,18 @@ def _vectors(
         for i, reference in enumerate(np.asarray(node).ravel()):
             yield from _vectors(f"{name}[{i}]", file[reference], file, objects, matlab)
     elif node.dtype.kind in "biuf" and node.attrs.get("MATLAB_class") != b"char":
-        yield from _arrays(name, np.asarray(node), matlab=matlab)
+        yield from _arrays(name, _scaled(node), matlab=matlab)
+
+
+def _scaled(node: Any) -> Vector:  # noqa: ANN401 - of h5py
+    """Return an array as its attributes say it is packed (CF conventions, 8.1)."""
+    values = np.asarray(node)
+    packing = {key: node.attrs[key] for key in PACKING if key in node.attrs}
+    if not packing:
+        return values
+    holes = np.isin(values, [np.ravel(packing[key])[0] for key in HOLES if key in packing])
+    scale, offset = (float(np.ravel(packing.get(key, one))[0]) for key, one in LINEAR.items())
+    return np.where(holes, np.nan, values * scale + offset)
 
 
 def _arrays(name: str, value: Vector, *, matlab: bool) -> list[tuple[str, Vector]]:

@@ -76,6 +76,15 @@ class LoadedTable(TableSource):
             ns = vector.astype("datetime64[ns]")
             whole = ns.astype(np.int64).astype(np.longdouble)
             return np.where(np.isnat(ns), np.longdouble("nan"), whole)
+        if vector.dtype.kind == "m":
+            if unit not in (None, "ns"):
+                raise InputError(
+                    f"{self.path}: column '{name}' holds durations, unit {unit}, allowed: ns"
+                )
+            self.time_units[name] = "ns"
+            spans = vector.astype("timedelta64[ns]")
+            counts = spans.astype(np.int64).astype(np.longdouble)
+            return np.where(np.isnat(spans), np.longdouble("nan"), counts)
         if vector.dtype.kind in "biuf":
             cells = TimeCells(self.path, name, unit)
             if cells.textual:

@@ -26,6 +26,15 @@ _MATLAB_HDF5 = b"MATLAB 7.3 MAT-file"
 _GZIP = b"\x1f\x8b"
 _ZIP = b"PK\x03\x04"
 _PARQUET = b"PAR1"
+_BENCHES = {
+    b"TDSm": "a TDMS file of LabVIEW, allowed: exported by `python -m pip install nptdms` and"
+    " `TdmsFile.read(FILE).as_dataframe(time_index=True).to_parquet(OUT)`",
+    **dict.fromkeys(
+        (b"MDF     3", b"MDF     4", b"UnFinMF "),
+        "an MDF file, allowed: exported by `python -m pip install asammdf` and"
+        " `MDF(FILE).export('parquet', OUT)`",
+    ),
+}
 _OLD_OFFICE = b"\xd0\xcf\x11\xe0"
 ALLOWED = "allowed: a text table, .csv.gz, .xlsx, .parquet, .mat or HDF5 file, or a bag"
 
@@ -81,6 +90,9 @@ def _opened(path: Path, form: CsvFormat, where: str) -> Source:
 def _binary_table(path: Path, start: bytes, form: CsvFormat) -> Source | None:
     if start.startswith(_HDF5) or start.startswith(_MATLAB_HDF5):
         return Hdf5Source(path, matlab=not start.startswith(_HDF5) or path.suffix == ".mat")
+    for mark, what in _BENCHES.items():
+        if start.startswith(mark):
+            raise InputError(f"{path}: {what}")
     if start.startswith(_PARQUET):
         return ParquetSource(path)
     if start.startswith(_ZIP):

@@ -53,6 +53,23 @@ class SpreadsheetSource(LoadedTable):
             for i, name in enumerate(self.columns)
         }
 
+    def _vector(self, name: str) -> Vector:
+        vector = super()._vector(name)
+        if vector.dtype.kind == "f" and len(vector) and np.isnan(vector).all():
+            self._refuse_formulas(name)
+        return vector
+
+    def _refuse_formulas(self, name: str) -> None:
+        """Refuse a column of formulas whose values were never saved."""
+        place = self.columns.index(name)
+        for number, row in enumerate(self._rows(values=False), start=1):
+            cell = row[place] if place < len(row) else None
+            if isinstance(cell, str) and cell.startswith("="):
+                raise InputError(
+                    f"{self.path}: row {number}, column '{name}': a formula without a saved value,"
+                    " allowed: a sheet that was calculated and saved, or a .csv of it"
+                )
+
     def _check_widths(self, body: list[tuple[int, Row]]) -> None:
         for number, row in body:
             if any(map(_text, row[len(self.columns) :])):
@@ -61,10 +78,10 @@ class SpreadsheetSource(LoadedTable):
                     " allowed: one each; `csv.names` gives a name to each"
                 )
 
-    def _rows(self) -> list[Row]:
+    def _rows(self, *, values: bool = True) -> list[Row]:
         openpyxl = extra_library("openpyxl", "files", str(self.path), ", or a text table")
         try:
-            book = openpyxl.load_workbook(self.path, read_only=True, data_only=True)
+            book = openpyxl.load_workbook(self.path, read_only=True, data_only=values)
         except Exception as err:  # of many kinds, whatever the damage makes the reader do
             raise InputError(
                 f"{self.path}: no spreadsheet that can be read ({' '.join(str(err).split())})"

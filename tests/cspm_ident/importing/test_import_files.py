@@ -183,3 +183,46 @@ def test_the_longest_axis_is_time():
     assert list(dict(signals("a", np.zeros((12, 2))))) == ["a[0]", "a[1]"]
     assert len(signals("a", np.zeros((100, 3, 2)))) == 6
     assert signals("a", np.zeros((100, 90))) == []
+
+
+def test_packed_numbers_of_hdf5_are_unpacked_and_holes_are_none(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    angles = np.sin(np.arange(40) / 20.0)
+    with h5py.File(tmp_path / "lab.h5", "w") as file:
+        file["t"] = np.arange(40) / 100.0
+        packed = np.round(angles * 32767.0).astype(np.int16)
+        packed[7] = -32768
+        file["q"] = packed
+        file["q"].attrs.update({"scale_factor": 1.0 / 32767.0, "_FillValue": np.int16(-32768)})
+    found = imported(tmp_path / "lab.h5", MAPPING % ("", "t", "q"), trial=True)
+    assert found.rows[STATE][:, 0] == pytest.approx(np.delete(angles, 7), abs=2e-5)
+
+
+def test_durations_are_times(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    times = pandas.to_timedelta(np.arange(40) * 10, unit="ms")
+    table = pandas.DataFrame({"t": times, "q": np.sin(np.arange(40) / 20.0)})
+    table.to_parquet(tmp_path / "lab.parquet")
+    found = imported(tmp_path / "lab.parquet", MAPPING % ("", "t", "q"), trial=True)
+    assert set(np.diff(found.stamps[STATE])) == {10_000_000}
+
+
+@pytest.mark.parametrize(
+    ("start", "named"),
+    [(b"TDSm\x0e", "nptdms"), (b"MDF     4.10    ", "asammdf"), (b"MDF     3.30    ", "asammdf")],
+)
+def test_files_of_test_benches_are_named_with_what_exports_them(tmp_path, start, named):
+    path = tmp_path / "lab.bin"
+    path.write_bytes(start + bytes(100))
+    with pytest.raises(InputError, match=named):
+        imported(path, MAPPING % ("", "t", "q"))
+
+
+def test_a_formula_that_was_never_calculated_is_named(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in (["t", "q"], *([i / 100, f"=SIN({i}/20)"] for i in range(5))):
+        book.active.append(row)
+    book.save(tmp_path / "lab.xlsx")
+    with pytest.raises(InputError, match="row 2, column 'q': a formula without a saved value"):
+        imported(tmp_path / "lab.xlsx", MAPPING % ("", "t", "q"))

@@ -11,7 +11,7 @@ from import_samples import imported, table
 from cspm_checks.pace import pace_of
 from cspm_ident.importing import column_store
 from cspm_ident.importing.mapping import Clock
-from cspm_ident.importing.time_base import out_of_order, times_of
+from cspm_ident.importing.time_base import out_of_order, times_of, unlike_log
 from cspm_ident.importing.unwrapping import Unwrapper
 from cspm_msgs_py.errors import InputError
 
@@ -266,3 +266,11 @@ drop:
     assert [topic.left_out.segments for topic in found.report.topics] == [(2, 0), (2, 2)]
     with pytest.raises(InputError, match=r"no message is left, allowed: at least one$"):
         imported(path, text.replace("end: 1,", "end: 99,"))
+
+
+def test_headers_unlike_the_log_are_told_and_a_usual_lag_is_not():
+    log = np.arange(300, dtype=np.longdouble) * 10_000_000
+    busy = np.random.default_rng(0).exponential(2_000_000, 300)
+    assert unlike_log(log - 5_000_000 - busy, log) == 0.0
+    whole = log // 1_000_000_000 * 1_000_000_000
+    assert unlike_log(whole, log) == pytest.approx(0.99)

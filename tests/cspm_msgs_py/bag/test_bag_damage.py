@@ -19,7 +19,6 @@ from bag_samples import (
     write_rosbag2,
 )
 from mcap.writer import CompressionType
-from rosbags.rosbag1 import Writer as Rosbag1Writer
 
 from cspm_msgs_py.bag import open_bag
 from cspm_msgs_py.errors import InputError
@@ -138,15 +137,25 @@ def test_rows_that_are_no_messages_are_refused(tmp_path, change, text):
     assert f"bag.db3: {text}" in refusal(path)
 
 
-def test_a_ros1_bag_that_was_not_closed_is_refused_with_the_remedy(tmp_path):
-    path = tmp_path / "open.bag"
-    writer = Rosbag1Writer(path)
-    writer.open()
-    writer.abort()
-    assert refusal(path).endswith(
-        "open.bag: a ROS 1 bag that was not closed, allowed: one with an index (`rosbag reindex`"
-        " restores it)"
-    )
+def test_a_ros1_bag_that_was_never_closed_is_read_as_far_as_it_goes(tmp_path):
+    path = write_rosbag1(tmp_path / "open.bag", sample_messages(100), chunk=SMALL)
+    with open_bag(path) as whole:
+        expected = [message.payload for message in whole.messages()]
+    content = bytearray(path.read_bytes())
+    place = content.index(b"index_pos=") + len(b"index_pos=")
+    (end,) = struct.unpack_from("<Q", content, place)
+    content[place : place + 8] = bytes(8)
+    # The last chunk and what follows it are cut.
+    path.write_bytes(content[: content.rindex(b"compression=", 0, end) + 40])
+    with open_bag(path) as cut:
+        found = [message.payload for message in cut.messages()]
+        (fault,) = cut.faults
+    assert 0 < len(found) < len(expected)
+    assert found == expected[: len(found)]
+    assert "was not closed: " in fault
+    assert f"with {len(found)} messages are read" in fault
+    path.write_bytes(content[: content.index(b"compression=")])
+    assert "holds no whole chunk" in refusal(path)
 
 
 def ros1_with(path, old, new, *, last=False):

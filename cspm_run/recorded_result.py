@@ -48,7 +48,8 @@ def recorded_result(
         interrupted=interrupted and failure is None,
         failure=failure or first_alarm(folder),
         warnings=run_warnings(scenario, testbed, statistics, late=timed),
-        limits_met=limits_met(scenario, statistics),
+        limits_met=limits_met(scenario, testbed, statistics),
+        saturation=tuple(statistics.saturation(testbed.cable_names)),
         timing=timing_of(folder) if timed else {},
         delays=torque_delays(folder) if timed else None,
     )

@@ -233,5 +233,6 @@ def simulate(
         interrupted=stopped and failure is None,
         failure=failure or (alarms[0] if alarms else None),
         warnings=run_warnings(scenario, parts.testbed, statistics),
-        limits_met=limits_met(scenario, statistics),
+        limits_met=limits_met(scenario, parts.testbed, statistics),
+        saturation=tuple(statistics.saturation(parts.testbed.cable_names)),
     )

@@ -21,6 +21,7 @@ from cspm_msgs_py.schedule import (
 from cspm_msgs_py.testbed import Testbed
 from cspm_msgs_py.topics import DIAGNOSTICS
 from cspm_run.run_statistics import KEPT_PERIOD, RunStatistics, torque_limits
+from cspm_run.stability.saturation import count_at_limit
 
 Array = NDArray[np.float64]
 
@@ -52,23 +53,21 @@ def recording_statistics(path: Path, testbed: Testbed) -> RunStatistics:
     infeasible[: round(float(shares.mean() * steps)) if len(shares) else 0] = True
     limit = np.array([0.0 if cable.has_cable else -1.0 for cable in testbed.cables])
     slack = np.any(tensions.rows <= limit, axis=1)
-    saturated = _saturated(tensions.log_ns, rows.get(TORQUE_COMMAND), testbed)
+    torques, limits = _torques(tensions.log_ns, rows.get(TORQUE_COMMAND)), torque_limits(testbed)
     period = 1e-9 * float(np.median(np.diff(tensions.log_ns))) if steps > 1 else KEPT_PERIOD
     statistics = RunStatistics(steps, tensions.rows.shape[1], period)
     for i in range(steps):
-        met = bool(slack[i]), bool(infeasible[i]), bool(saturated[i])
+        saturated = count_at_limit(statistics.drives, torques[i], limits) if len(torques) else False
+        met = bool(slack[i]), bool(infeasible[i]), saturated
         statistics.add(errors[i], tensions.rows[i], *met)
     return statistics
 
 
-def _saturated(
-    at_ns: NDArray[np.int64], torques: Rows | None, testbed: Testbed
-) -> NDArray[np.bool_]:
-    """Return at which instants a motor is commanded its torque limit, (k,)."""
+def _torques(at_ns: NDArray[np.int64], torques: Rows | None) -> Array:
+    """Return the commanded torques at some instants, (k, n) [N·m]; none where none are known."""
     if torques is None or not len(torques.rows):
-        return np.zeros(len(at_ns), dtype=bool)
-    found = np.abs(_held(at_ns, torques)) >= torque_limits(testbed)
-    return np.asarray(found.any(axis=1))
+        return np.zeros((0, 0))
+    return _held(at_ns, torques)
 
 
 def _present(counts: dict[str, int], name: str) -> str | None:

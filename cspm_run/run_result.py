@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cspm_msgs_py.stepping.delay_histogram import DelayHistogram
 from cspm_run.run_statistics import RunStatistics
+from cspm_run.stability.saturation import DriveSaturation
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class RunResult:
         failure: what went wrong, in one line, if anything did.
         warnings: what is not as it should be though the run went on, a line each.
         limits_met: a line on how much of the time a closed loop was at a limit, if it matters.
+        saturation: how each drive met its torque limit.
         timing: in real time, what each node reported of its deadlines and inputs, by node.
         delays: in real time, how late torque commands came to the simulated plant.
     """
@@ -46,6 +48,7 @@ class RunResult:
     failure: str | None = None
     warnings: tuple[str, ...] = ()
     limits_met: str | None = None
+    saturation: tuple[DriveSaturation, ...] = ()
     timing: dict[str, dict[str, float]] = field(default_factory=dict)
     delays: DelayHistogram | None = None
 

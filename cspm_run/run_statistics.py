@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from cspm_msgs_py.testbed import Testbed
+from cspm_run.stability.saturation import KINDS, DriveSaturation, of_tally
 
 Array = NDArray[np.float64]
 
@@ -24,6 +27,7 @@ class RunStatistics:
         squares: sums of the squared pose errors, (6,).
         counts: steps, and those with a slack cable, with an infeasible wrench and with a motor at
             its limit.
+        drives: what was counted of drives at their torque limit, see `count_at_limit`.
         kept: tensions (KEPT, n) [N], one instant of `kept_steps`; the oldest are replaced.
         kept_steps: from one instant that is kept to the next.
         period: of a step [s].
@@ -36,6 +40,7 @@ class RunStatistics:
         self.envelope[:, 0], self.envelope[:, 1] = np.inf, -np.inf
         self.squares = np.zeros(6)
         self.counts = np.zeros(4, dtype=np.int64)
+        self.drives = np.zeros(KINDS * n_cables, dtype=np.int64)
         self.kept_steps = max(1, round(KEPT_PERIOD / period))
         self.period = period
         self.kept: Array = np.zeros((KEPT, n_cables))
@@ -107,6 +112,10 @@ class RunStatistics:
         """Share of time with any motor at its torque limit."""
         return float(self.counts[3] / max(1, self.steps))
 
+    def saturation(self, names: Sequence[str]) -> list[DriveSaturation]:
+        """Return how each drive met its torque limit, by the cables' names in their order."""
+        return of_tally(self.drives, self.steps, self.period, names)
+
     @property
     def kept_period(self) -> float:
         """From one instant that is kept to the next [s]."""
@@ -146,12 +155,3 @@ def keep_step(kept: Array, step: int, kept_steps: int, tensions: Array) -> None:
 def torque_limits(testbed: Testbed) -> Array:
     """Return the largest torque of each motor, (n,) [N·m]."""
     return np.array([cable.torque_limit for cable in testbed.cables], dtype=float)
-
-
-@njit(cache=True)
-def any_at_limit(torques: Array, limits: Array) -> bool:
-    """Return whether any of the torques (n,) is at its limit (n,), or beyond it [N·m]."""
-    found = 0
-    for i in range(limits.shape[0]):
-        found += abs(torques[i]) >= limits[i]
-    return found > 0

@@ -10,7 +10,8 @@ import numpy as np
 from cspm_msgs_py.recording.writer import BLOCK_NS
 from cspm_run.compiled.compiled_loop import CompiledLoop, TakeBlock, first_compiled_step
 from cspm_run.loop import Loop
-from cspm_run.run_statistics import RunStatistics, any_at_limit, torque_limits
+from cspm_run.run_statistics import RunStatistics, torque_limits
+from cspm_run.stability.saturation import count_at_limit
 from cspm_sim.plant import Plant
 
 PROGRESS_STEPS = 50
@@ -86,5 +87,6 @@ class Stepping:
             bar_pose, tensions = plant.bar_state[:6].copy(), plant.tensions.copy()
             loop.step()
             error = zero if reference is None else reference[:6] - bar_pose
-            saturated = any_at_limit(loop.simulator.torque, self._limits)
+            torques, tally = loop.simulator.torque, self._statistics.drives
+            saturated = count_at_limit(tally, torques, self._limits)
             self._statistics.add(error, tensions, loop.slack, loop.infeasible, saturated)

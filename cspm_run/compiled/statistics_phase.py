@@ -13,10 +13,10 @@ from cspm_msgs_py.schedule import TORQUE_COMMAND
 from cspm_run.run_statistics import (
     RunStatistics,
     add_step,
-    any_at_limit,
     keep_step,
     torque_limits,
 )
+from cspm_run.stability.saturation import count_at_limit
 from cspm_sim.kernels.phases import SLACK
 from cspm_sim.simulator import Simulator
 from cspm_sim.simulator_phases import BAR_COORDINATES
@@ -47,7 +47,8 @@ def _kernel(step: int, row: Array, places: Places) -> int:
     counts[0] += 1
     counts[1] += slack[SLACK]
     counts[2] += infeasible
-    counts[3] += any_at_limit(row[integers[TORQUES] : integers[TORQUES] + len(limits)], limits)
+    torques = row[integers[TORQUES] : integers[TORQUES] + len(limits)]
+    counts[3] += count_at_limit(integers_at(places, 10), torques, limits)
     if infeasible == 0:
         integers[FEASIBLE_AT] = step
     return DONE
@@ -87,4 +88,5 @@ def statistics_phase(
         statistics.squares,
         statistics.kept,
         torque_limits(simulator.plant.testbed),
+        statistics.drives,
     )

@@ -34,6 +34,10 @@ def summary_data(result: RunResult) -> dict[str, Any]:
         "tension": {"min": low, "max": high},
         "slack_share": statistics.slack_share,
         "infeasible_share": statistics.infeasible_share,
+        "saturation": {
+            each.drive: {"share": each.share, "longest_s": each.longest}
+            for each in result.saturation
+        },
         "controlled": list(result.controlled),
         "messages": result.messages,
         "warnings": warned(result),

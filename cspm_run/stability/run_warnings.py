@@ -8,6 +8,7 @@ from cspm_msgs_py.testbed import Testbed
 from cspm_run.run_statistics import RunStatistics
 from cspm_run.stability.limit_cycle import oscillation
 from cspm_run.stability.loop_growth import loop_growth, period_of_force
+from cspm_run.stability.saturation import saturation_words
 
 # Less of the time does not matter: a gust. Shorter than this [s] there is a start, which shows
 # nothing.
@@ -44,12 +45,17 @@ def unstable_line(scenario: Scenario, testbed: Testbed, *, late: bool = False) -
     )
 
 
-def limits_met(scenario: Scenario, statistics: RunStatistics) -> str | None:
-    """Return a line on how much of the time a closed loop was at a limit; None for hardly any."""
+def limits_met(scenario: Scenario, testbed: Testbed, statistics: RunStatistics) -> str | None:
+    """Return a line on how much of the time a closed loop was at a limit; None for hardly any.
+
+    Arguments as `run_warnings`.
+    """
     shares = _shares(scenario, statistics)
     if not shares:
         return None
-    return "limits met: " + ", ".join(f"{what} {share:.1%} of the time" for what, share in shares)
+    line = "limits met: " + ", ".join(f"{what} {share:.1%} of the time" for what, share in shares)
+    drives = saturation_words(statistics.saturation(testbed.cable_names), NOTED_SHARE)
+    return f"{line}: {drives}" if drives else line
 
 
 def _shares(scenario: Scenario, statistics: RunStatistics) -> list[tuple[str, float]]:

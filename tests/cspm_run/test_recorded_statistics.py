@@ -30,6 +30,10 @@ def assert_equal(kept, found):
     assert found.tension_range == kept.tension_range
     assert found.slack_share == kept.slack_share
     assert found.saturated_share == pytest.approx(kept.saturated_share, abs=2.0 / kept.steps)
+    drives = [str(i) for i in range(kept.envelope.shape[2] - 6)]
+    for ours, theirs in zip(kept.saturation(drives), found.saturation(drives), strict=True):
+        assert theirs.share == pytest.approx(ours.share, abs=2.0 / kept.steps)
+        assert theirs.longest == pytest.approx(ours.longest, abs=2.1 * kept.period)
     assert found.kept_steps == kept.kept_steps
     assert found.period == pytest.approx(kept.period)
     np.testing.assert_array_equal(found.last_tensions, kept.last_tensions)

@@ -83,6 +83,7 @@ def test_summary_has_the_contracts_keys_and_survives_json(measured, tmp_path):
         "tension",
         "slack_share",
         "infeasible_share",
+        "saturation",
         "controlled",
         "messages",
         "warnings",
@@ -91,6 +92,8 @@ def test_summary_has_the_contracts_keys_and_survives_json(measured, tmp_path):
     assert data["duration_s"] == pytest.approx(0.6)
     assert list(data["errors"]) == list(DOFS)
     assert data["warnings"] == []
+    assert all(set(each) == {"share", "longest_s"} for each in data["saturation"].values())
+    assert len(data["saturation"]) == 8
     assert data["controlled"] == ["surge", "sway", "heave", "pitch", "yaw"]
     counts = {name: len(found.stamp_ns) for name, found in rows.items()}
     shown = {"/tf_static": 1, "/robot_description": 1, "/tf": 12, "/markers": 6}

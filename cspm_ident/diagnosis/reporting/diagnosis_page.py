@@ -23,6 +23,7 @@ from cspm_ident.diagnosis.reporting.page_checks import (
     controllers_table,
     data_table,
     energy_table,
+    saturation_table,
 )
 from cspm_ident.diagnosis.reporting.statement import (
     channel_of,
@@ -52,6 +53,7 @@ nav a {display: inline-block; margin: 0.2em 1em 0.2em 0; padding: 0.3em 0}
 </style>"""
 _SECTIONS = {
     "data": "The data first",
+    "saturation": "Drives at their torque limit",
     "evidence": "Evidence on held-out data",
     "parameters": "Parameters",
     "hypotheses": "Hypotheses",
@@ -82,6 +84,7 @@ def write_diagnosis_page(path: Path, found: Diagnosis, data: dict[str, Any]) -> 
     about = f"<p>Diagnosis of {escape(names)}: {verdict.value}</p>"
     bodies = {
         "data": data_table(data),
+        "saturation": saturation_table(found),
         "evidence": _evidence(found),
         "parameters": _parameters(data),
         "hypotheses": _hypotheses(found, data),

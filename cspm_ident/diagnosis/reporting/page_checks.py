@@ -9,6 +9,10 @@ from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
 from cspm_ident.offline_page import table_html
+from cspm_run.run_statistics import torque_limits
+from cspm_run.stability.saturation import STRETCH_S, saturation_of
+
+_AT_LIMIT = 0.995
 
 
 def data_table(data: dict[str, Any]) -> str:
@@ -26,6 +30,28 @@ def data_table(data: dict[str, Any]) -> str:
     text = f"<p>{wrong} of {len(rows)} checks found something, before any model was fitted.</p>"
     heads = ("recording", "check", "what was found", "remedy")
     return text + table_html(heads, rows, "the recordings themselves") if rows else ""
+
+
+def saturation_table(found: Diagnosis) -> str:
+    """Return which drives were at their torque limit as HTML; empty where none was.
+
+    Touches count that are too short for the check of the data, which names stretches.
+    """
+    rows = []
+    for each in (*found.searched, *found.held_out):
+        if each.torque is None:
+            continue
+        # Of the limit: drives round what they report.
+        limits = _AT_LIMIT * torque_limits(each.machine)
+        names, torque = each.machine.cable_names, each.torque
+        for drive in saturation_of(torque.times, torque.values, limits, names):
+            if drive.longest > 0.0:
+                kind = "stretches" if drive.longest >= STRETCH_S else "chatter"
+                cells = f"{100.0 * drive.share:.1f}", kind, f"{1e3 * drive.longest:.3g}"
+                rows.append((each.path.name, drive.drive.replace("_", " "), *cells))
+    heads = ("recording", "drive", "share of the time [%]", "kind", "longest [ms]")
+    text = "<p>Where a drive is at its limit it does not give what is asked of it.</p>"
+    return text + table_html(heads, rows, "drives at their torque limit") if rows else ""
 
 
 def energy_table(found: Diagnosis) -> str:

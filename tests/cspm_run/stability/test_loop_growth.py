@@ -182,6 +182,6 @@ def test_shares_below_a_hundredth_and_starts_are_not_noted():
     for steps, slack, noted in ((2000, 30, True), (2000, 10, False), (900, 300, False)):
         statistics = run(bundle, None, steps=1).statistics
         statistics.counts[:] = steps, slack, 0, 0
-        line = limits_met(scenario, statistics)
+        line = limits_met(scenario, testbed, statistics)
         assert line == ("limits met: a cable slack 1.5% of the time" if noted else None)
         assert run_warnings(scenario, testbed, statistics) == ()

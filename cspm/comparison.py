@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cspm.measured import measured
-from cspm.progress import Progress, by_steps, silent
+from cspm.progress import Progress, by_steps, shows_progress, silent
 from cspm.recorded import AnyRecording
 from cspm.testbed import AnyTestbed
 from cspm_ident.block_simulation import Input
@@ -102,6 +102,7 @@ class Comparison:
         return place / "report.html"
 
 
+@shows_progress("reading")
 def compare(
     recording: AnyRecording,
     *,
@@ -123,7 +124,8 @@ def compare(
             tension, whose errors grow, and never for winch.
         delays: how late sensors' stamps are [s], by topic; None: found.
         repeat: the same experiment once more, from which the noise floor is taken.
-        progress: called now and then with an estimate of the share and what is being done.
+        progress: called now and then with an estimate of the share and what is being done;
+            none: a bar in a terminal, lines in a notebook.
 
     Raises:
         InputError: naming what is wrong in recording, test-bed or arguments.

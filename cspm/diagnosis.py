@@ -11,7 +11,7 @@ from typing import Any
 
 from cspm.measured import read_for
 from cspm.parameters import Parameter, Parameters
-from cspm.progress import Progress, by_steps, silent
+from cspm.progress import Progress, by_steps, shows_progress, silent
 from cspm.recorded import AnyRecording
 from cspm.testbed import AnyTestbed, Testbed, as_file
 from cspm_ident.data_look.look import look_at, without_regimes
@@ -188,6 +188,7 @@ class Diagnosis:
         return place
 
 
+@shows_progress("reading")
 def diagnose(
     recordings: AnyRecording | Iterable[AnyRecording],
     *,
@@ -213,7 +214,8 @@ def diagnose(
             rest of their recording; `data["data_checks"]` names them.
         thresholds: those that are not the defaults, by name, such as `{"material_share": 0.1}`;
             `docs/reference/thresholds.md` lists all with units and ranges.
-        progress: called now and then with an estimate of the share that is done and what is done.
+        progress: called now and then with an estimate of the share that is done and what is done;
+            none: a bar in a terminal, lines in a notebook.
 
     Raises:
         InputError: naming what is wrong in recordings, test-bed or thresholds.

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
-from cspm.progress import Progress, silent
+from cspm.progress import Progress, shows_progress, silent
 from cspm.recorded import Recording
 from cspm.testbed import AnyTestbed, as_file
 from cspm_ident.importing.column_store import ColumnStore
@@ -24,6 +24,7 @@ MAPPING, REPORT = "mapping.yaml", "import.yaml"
 MODE = "import"
 
 
+@shows_progress("reading")
 def import_recording(
     source: str | Path,
     folder: str | Path,
@@ -43,7 +44,8 @@ def import_recording(
         mapping: which column is which number, in which unit: a name of the library or a file; see
             `docs/reference/import-mapping.md`.
         testbed: the machine that was recorded: a name, a file or a `Testbed`.
-        progress: called now and then with the share that is done and what is being done.
+        progress: called now and then with the share that is done and what is being done;
+            none: a bar in a terminal, lines in a notebook.
 
     Raises:
         InputError: naming what is wrong in the file, the mapping or the test-bed.

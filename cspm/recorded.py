@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
-from cspm.progress import Progress, silent
+from cspm.progress import Progress, shows_progress, silent
 from cspm.signals import Signals
 from cspm.testbed import Testbed
 from cspm_msgs_py.errors import InputError
@@ -87,6 +87,7 @@ class Recording(Signals):
         """
         return recover_recording(Path(path), None if out is None else Path(out))
 
+    @shows_progress("repeating")
     def resimulate(
         self, progress: Progress = silent, *, controllers: Sequence[str | Path] = ()
     ) -> Resimulation:

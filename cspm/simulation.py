@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from cspm.controller import Controller, with_own
-from cspm.progress import Progress, silent
+from cspm.progress import Progress, shows_progress, silent
 from cspm.recorded import Recording
 from cspm.reference import Reference, with_reference
 from cspm.scenario import AnyScenario, Scenario, as_scenario, with_changes
@@ -168,6 +168,7 @@ class Run(Signals):
         return f"Run({self._bundle.scenario.name!r}, {self.duration:g} s{end})"
 
 
+@shows_progress("simulating")
 def simulate(
     scenario: AnyScenario,
     *,
@@ -196,7 +197,8 @@ def simulate(
             `external`, somebody's drivers.
         mode: `inprocess`, without ROS; `graph`, ROS 2 nodes in one process; `processes`, a process
             per node; these three give the same messages. `realtime`: nodes paced by the clock.
-        progress: called now and then with the share that is done and what is being done.
+        progress: called now and then with the share that is done and what is being done;
+            none: a bar in a terminal, lines in a notebook.
 
     Raises:
         InputError: no such scenario or test-bed, a value that is not allowed, or scenario and

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm.analysis.machine import DEFAULT_SCENARIO, AnalyzedMachine, analyzed_machine, six
-from cspm.progress import Progress, silent
+from cspm.progress import Progress, shows_progress, silent
 from cspm.scenario import AnyScenario
 from cspm.testbed import AnyTestbed
 from cspm_control.analysis.cable_structure import cable_structure
@@ -78,6 +78,7 @@ class Workspace:
         return tuple(place / name for name in PICTURES)
 
 
+@shows_progress("searching")
 def analyze_workspace(
     scenario: AnyScenario = DEFAULT_SCENARIO,
     *,
@@ -95,7 +96,8 @@ def analyze_workspace(
         pose: of the bar, x y z φ θ ψ in world_ned [m, rad]; None: where controllers are designed.
         acceleration: required either way (6,) [m/s², rad/s²]; None: the RMS of the reference.
         coarse: take every so-manieth value of each DOF of the whole grids, 28.6 million poses.
-        progress: called now and then with the share that is done and what is being done.
+        progress: called now and then with the share that is done and what is being done;
+            none: a bar in a terminal, lines in a notebook.
 
     Raises:
         InputError: no such scenario or test-bed, a machine without bar, or a negative acceleration.

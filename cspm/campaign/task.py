@@ -24,6 +24,7 @@ from cspm.campaign.measures import (
 from cspm.campaign.variants import Variant
 from cspm.changed_machine import changed_machine, of_testbed
 from cspm.diagnosis import diagnose
+from cspm.progress import silent
 from cspm.scenario import Scenario
 from cspm.simulation import Run, bundle_of, simulate_in_memory
 from cspm_msgs_py.errors import CspmError, InputError
@@ -164,7 +165,8 @@ def _metric(name: str, task: Task) -> Metric:
 def _diagnosed(run: Run, machine: TestbedFile) -> Row:
     with ScratchFolder("campaign") as place:
         recording = run.save(place / "run")
-        return diagnosis_columns(diagnose(recording, testbed=machine, closed_loop=False))
+        found = diagnose(recording, testbed=machine, closed_loop=False, progress=silent)
+        return diagnosis_columns(found)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import Json, app
+from cspm.cli.early_checks import check_given
 from cspm_msgs_py.errors import InputError
 
 DRIVES = ("winch", "torque", "tension")
@@ -93,14 +94,15 @@ def compare(
 
     The whole, then cables and bar alone, each from what was measured.
     """
-    from cspm.commands.compare_command import CompareRequest, compare_command
-    from cspm_ident.block_simulation import Input
-
     if drive not in DRIVES:
         raise InputError(f"--drive {drive}: allowed: {', '.join(DRIVES)}")
     if horizon is not None and not 0.01 <= horizon <= 3600.0:
         raise InputError(f"--horizon {horizon:g}: allowed: 0.01 to 3600 s")
     delays = _delays(delay)
+    check_given([recording, repeat], testbed, out)
+    from cspm.commands.compare_command import CompareRequest, compare_command
+    from cspm_ident.block_simulation import Input
+
     compare_command(
         CompareRequest(recording, testbed, Input(drive), horizon, delays, repeat, out), json
     )

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import Json, app, new_folder
+from cspm_msgs_py.new_folder import refuse_existing
 
 # Few enough digits to be remembered and typed again.
 _SEEDS = 1000
@@ -56,6 +57,7 @@ def demo(
 
     The recording, the verdict's page and a page with the improved model beside the recording stay.
     """
+    refuse_existing(out)
     from cspm.commands.demo_command import DemoRequest, demo_command
 
     asked = sys.stdin.isatty() and sys.stdout.isatty() if guess is None else guess

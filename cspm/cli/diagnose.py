@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import Json, LeaveOutRegimes, app
+from cspm.cli.early_checks import SEARCHED, SPLIT, begin_judged
 from cspm.cli.held_out import OPTION, JudgedCommand
 from cspm_msgs_py.errors import InputError
 
@@ -73,10 +74,12 @@ def diagnose(
 
         explain_command(explain)
         return
-    from cspm.commands.diagnose_command import DiagnoseRequest, diagnose_command
-
     if not recordings:
         raise InputError("diagnose: no recording, allowed: one or more, or --explain EFFECT")
+    role = SEARCHED if held_out else SPLIT
+    begin_judged(role, recordings, held_out or (), testbed, out)
+    from cspm.commands.diagnose_command import DiagnoseRequest, diagnose_command
+
     diagnose_command(
         DiagnoseRequest(recordings, held_out or [], testbed, out, closed_loop, leave_out_regimes),
         json,

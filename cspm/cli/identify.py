@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from cspm.cli.app import MARKUP, RUN_FAILED, Json, LeaveOutRegimes, app
+from cspm.cli.early_checks import FITTED, begin_judged, check_given
 from cspm.cli.held_out import HeldOut, JudgedCommand
 from cspm_msgs_py.errors import InputError
 
@@ -101,10 +102,11 @@ def _rig_request(
     cutoff: Cutoff = None,
     out: Out = None,
 ) -> RigRequest:
-    from cspm.rig import RigRequest
-
     if cutoff is not None and not cutoff > 0.0:
         raise InputError(f"--cutoff {cutoff:g}: allowed: a frequency above 0 Hz")
+    check_given(recordings, testbed, out)
+    from cspm.rig import RigRequest
+
     return RigRequest(
         recordings=tuple(recordings),
         testbed=testbed,
@@ -250,6 +252,7 @@ def winch(
 
     Each winch by itself, in weak form: nothing is differentiated that carries noise.
     """
+    begin_judged(FITTED, recordings, held_out or (), testbed, out)
     from cspm.commands.identify_winch_command import WinchRequest, identify_winch_command
 
     request = WinchRequest(
@@ -290,6 +293,7 @@ def lengths(
     json: Json = None,
 ) -> None:
     """Hold encoders against cable lengths. Those of measured poses give scale, zero and sag."""
+    begin_judged(FITTED, recordings, held_out or (), testbed, out)
     from cspm.commands.identify_lengths_command import identify_lengths_command
 
     _end(identify_lengths_command(tuple(recordings), tuple(held_out or ()), testbed, out, json))
@@ -367,6 +371,7 @@ def system(
     Windows of each recording are simulated from measured motor angles and the frame's pose, and
     compared with the bar's pose and the tensions.
     """
+    begin_judged(FITTED, recordings, held_out or (), testbed, out)
     from cspm.commands.identify_system_command import SystemRequest, identify_system_command
 
     request = SystemRequest(

@@ -8,7 +8,9 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import RUN_FAILED, Json, app, new_folder
+from cspm.cli.early_checks import check_given
 from cspm_msgs_py.errors import InputError
+from cspm_run.library import find_mapping
 
 
 @app.command(epilog="Example: cspm info recordings/calm-20260131-120000")
@@ -120,10 +122,12 @@ def import_(
 
     What looks wrong is reported: units, signs, gaps, clocks. Nothing is interpolated.
     """
-    from cspm.commands.import_command import Import, import_command
-
     if dry_run and out is not None:
         raise InputError(f"--out {out} --dry-run: allowed: one of both")
+    check_given([], testbed, out)
+    find_mapping(str(mapping))
+    from cspm.commands.import_command import Import, import_command
+
     folder = out if out is not None else new_folder(mapping.stem)
     import_command(Import(file, mapping, testbed, None if dry_run else folder), json)
 

@@ -12,7 +12,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cspm.commands.data_look_lines import SEARCHED, SPLIT, print_data_look, print_roles
+from cspm.commands.data_look_lines import print_data_look
 from cspm.commands.progress_shown import shown
 from cspm.diagnosis import diagnose
 from cspm_ident.diagnosis.diagnosis import Diagnosis
@@ -42,7 +42,6 @@ from cspm_ident.diagnosis.reporting.verdict import (
 )
 from cspm_ident.diagnosis.validation.closed_loop import ClosedLoopFit
 from cspm_ident.diagnosis.validation.controller_parity import Parity
-from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.testbed import Testbed
 from cspm_run.library import named_testbed
 from cspm_run.output.console import make_console, say
@@ -78,9 +77,6 @@ def diagnose_command(request: DiagnoseRequest, json: Path | None) -> None:
         InputError: recordings, test-bed or options cannot be used.
     """
     console = make_console()
-    refuse_existing(request.out)
-    role = SEARCHED if request.held_out else SPLIT
-    print_roles(console, request.recordings, request.held_out, role)
     with shown(console, "reading") as progress:
         found = diagnose(
             request.recordings,

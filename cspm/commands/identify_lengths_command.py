@@ -8,12 +8,10 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cspm.commands.data_look_lines import FITTED, print_roles
 from cspm.commands.identify_outcome import hand_out, interval_text
 from cspm.commands.progress_shown import shown
 from cspm.identification.lengths import identify_lengths
 from cspm_ident.lengths.identify_lengths import LATE, SAG, SCALE, CableLength, LengthsResult
-from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.library import named_testbed
 from cspm_run.output.console import make_console, say
 
@@ -33,8 +31,6 @@ def identify_lengths_command(
         InputError: recordings, test-bed or options cannot be used.
     """
     console = make_console()
-    refuse_existing(out)
-    print_roles(console, recordings, held_out, FITTED)
     with shown(console, "lengths"):
         found = identify_lengths(
             recordings,

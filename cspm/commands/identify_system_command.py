@@ -12,7 +12,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm.commands.data_look_lines import FITTED, print_roles
 from cspm.commands.identify_outcome import hand_out, interval_text
 from cspm.commands.progress_shown import shown
 from cspm.identification.system import identify_system
@@ -20,7 +19,6 @@ from cspm_ident.estimation import Prior
 from cspm_ident.system.identification import SystemResult
 from cspm_ident.system.prediction_test import Judgement
 from cspm_msgs_py.dofs import DOFS
-from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.library import named_testbed
 from cspm_run.output.console import make_console, say
 
@@ -65,8 +63,6 @@ def identify_system_command(request: SystemRequest, json: Path | None) -> bool:
         InputError: recordings, test-bed or options cannot be used.
     """
     console = make_console()
-    refuse_existing(request.out)
-    print_roles(console, request.recordings, request.held_out, FITTED)
     with shown(console, "reading") as progress:
         found = identify_system(
             request.recordings,

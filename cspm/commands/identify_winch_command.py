@@ -12,12 +12,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from cspm.commands.data_look_lines import FITTED, print_roles
 from cspm.commands.identify_outcome import hand_out, interval_text
 from cspm.commands.progress_shown import shown
 from cspm.identification.winches import identify_winch
 from cspm_ident.winch.identified_winch import IdentifiedWinch, WinchesResult
-from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.library import named_testbed
 from cspm_run.output.console import make_console, say
 
@@ -63,8 +61,6 @@ def identify_winch_command(request: WinchRequest, json: Path | None) -> bool:
         InputError: recordings, test-bed or options cannot be used.
     """
     console = make_console()
-    refuse_existing(request.out)
-    print_roles(console, request.recordings, request.held_out, FITTED)
     with shown(console, "reading") as progress:
         found = identify_winch(
             request.recordings,

@@ -9,7 +9,7 @@ from pathlib import Path
 from cspm.identification.identified import Identification, estimates, source_of
 from cspm.measured import looked_at
 from cspm.parameters import Parameters
-from cspm.progress import Progress, by_steps, silent
+from cspm.progress import Progress, by_steps, shows_progress, silent
 from cspm.recorded import AnyRecording
 from cspm.testbed import AnyTestbed
 from cspm_ident.data_look.data_check import DataCheck
@@ -19,6 +19,7 @@ from cspm_ident.winch.identify_winches import BAND_HZ, EFFECTS, identify_winches
 from cspm_msgs_py.testbed import TestbedFile
 
 
+@shows_progress("reading")
 def identify_winch(
     recordings: AnyRecording | Iterable[AnyRecording],
     *,
@@ -50,7 +51,8 @@ def identify_winch(
         band: torque errors are counted below this frequency [Hz]; None for 40 Hz.
         leave_out_regimes: whether to leave out the stretches that obey another equation than the
             rest of their recording.
-        progress: called now and then with an estimate of the share and what is being done.
+        progress: called now and then with an estimate of the share and what is being done;
+            none: a bar in a terminal, lines in a notebook.
 
     Raises:
         InputError: naming what is wrong in recordings, test-bed or arguments.

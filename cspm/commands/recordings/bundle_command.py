@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from cspm.commands.progress_shown import shown
 from cspm.exporting.verdict_bundle import write_bundle
 from cspm_run.output.console import make_console, say
 from cspm_run.output.json_file import write_json
@@ -25,8 +26,9 @@ def bundle_command(
     Raises:
         InputError: a file cannot be used, or does not belong to the verdict.
     """
-    packed = write_bundle(out, recordings, verdict, testbed)
     console = make_console()
+    with shown(console, "packing"):
+        packed = write_bundle(out, recordings, verdict, testbed)
     for path, name in packed.names.items():
         say(console, f"{path} → {name}")
     for name in packed.code:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from cspm.commands.progress_shown import shown
 from cspm.exporting.signal_file import check_place, write_signals
 from cspm.recorded import Recording
 from cspm_msgs_py.errors import InputError
@@ -30,9 +31,11 @@ def export_command(bag: Path, out: Path, names: Sequence[str], json: Path | None
     if unknown or not recording.names:
         has = ", ".join(recording.names) or "none of them"
         raise InputError(f"{bag}: no {unknown[0] if unknown else 'signal'}, it has: {has}")
-    signals = [recording.signal(name) for name in names or recording.names]
-    write_signals(out, signals)
     console = make_console()
+    with shown(console, "reading") as progress:
+        signals = [recording.signal(name) for name in names or recording.names]
+        progress(0.0, "writing")
+        write_signals(out, signals)
     for each in signals:
         units = ", ".join(dict.fromkeys(each.units))
         say(console, f"{each.name}: {len(each)} × {len(each.columns)} [{units}]")

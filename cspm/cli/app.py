@@ -30,7 +30,7 @@ class _Listed(typer.core.TyperGroup):
     order = (
         *("demo", "new", "run", "view", "info", "recover", "resim", "data", "import", "export"),
         *("compare", "identify", "diagnose", "bundle", "merge", "campaign", "analyze"),
-        *("doctor", "schema", "replay", "check-drivers", "urdf", "node"),
+        *("doctor", "schema", "migrate", "replay", "check-drivers", "urdf", "mjcf", "node"),
     )
 
     def list_commands(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]

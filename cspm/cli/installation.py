@@ -1,4 +1,4 @@
-"""Commands about the installation and files: doctor, schema, merge."""
+"""Commands about the installation and files: doctor, schema, migrate, merge."""
 
 from __future__ import annotations
 
@@ -67,6 +67,35 @@ def schema(
     from cspm.commands.installation.schema_command import schema_command
 
     schema_command(kind, json)
+
+
+@app.command(
+    epilog="""Examples:
+
+cspm migrate my_rig.yaml
+
+cspm migrate recordings/calm-20260131-120000
+
+Exit code: 0 valid as it is, 2 what has to be changed, or unusable input."""
+)
+def migrate(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="A test-bed, scenario, mapping, campaign or diagnosis of an older version, or a"
+            " recording.",
+        ),
+    ],
+    json: Json = None,
+) -> None:
+    """Look whether a file of an older version is valid. Or name the key that has to be changed.
+
+    No version has renamed or dropped a key, so that files of all versions are valid as they are.
+    """
+    from cspm.commands.installation.migrate_command import migrate_command
+
+    migrate_command(file, json)
 
 
 @app.command(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from pydantic import BaseModel
@@ -73,13 +73,36 @@ def schema_of(kind: str) -> Schema:
     Raises:
         InputError: no such kind.
     """
-    if kind not in _MODELS:
-        raise InputError(f"schema {kind}: allowed: {', '.join(KINDS)}")
-    found = _schema(_MODELS[kind]())
+    found = _schema(model_of(kind))
     if kind == "testbed":
         found = _walked(found, _or_sourced)
         found["$defs"][_SOURCED] = _sourced_value()
     return {"$schema": GenerateJsonSchema.schema_dialect, **found}
+
+
+def model_of(kind: str) -> type[BaseModel]:
+    """Return the model by which a kind of file is checked.
+
+    Raises:
+        InputError: no such kind.
+    """
+    if kind not in _MODELS:
+        raise InputError(f"schema {kind}: allowed: {', '.join(KINDS)}")
+    return _MODELS[kind]()
+
+
+def kind_of(content: Mapping[str, Any]) -> str | None:
+    """Return the kind of file that has most of a file's keys; None where none has half of them."""
+    shares = {
+        kind: sum(key in _keys(model_of(kind)) for key in content) / max(len(content), 1)
+        for kind in KINDS
+    }
+    best = max(shares, key=lambda kind: shares[kind])
+    return best if shares[best] > 0.5 else None
+
+
+def _keys(model: type[BaseModel]) -> set[str]:
+    return {field.alias or name for name, field in model.model_fields.items()}
 
 
 def _schema(model: type[BaseModel]) -> Schema:

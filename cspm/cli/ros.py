@@ -272,3 +272,29 @@ def urdf(
     from cspm.commands.urdf_command import urdf_command
 
     urdf_command(testbed, out)
+
+
+@app.command(
+    epilog="""Examples:
+
+cspm mjcf fitted/fitted_testbed.yaml --out joints.xml
+
+Then, in a model of MuJoCo: <include file="joints.xml"/>, and <joint class="NAME" …/>."""
+)
+def mjcf(
+    testbed: Annotated[
+        str, typer.Argument(metavar="TESTBED", help="A machine of the library, or its file.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A new file; without it to standard output."),
+    ] = None,
+) -> None:
+    """Write winches as joints of MuJoCo. Armature, damping and friction loss, as identified.
+
+    A default class for each, which your model includes. What MuJoCo's joints do not have, such as
+    friction that grows with load, is named in comments.
+    """
+    from cspm.commands.urdf_command import mjcf_command
+
+    mjcf_command(testbed, out)

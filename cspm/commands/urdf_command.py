@@ -1,4 +1,4 @@
-"""The command `cspm urdf`."""
+"""The commands `cspm urdf` and `cspm mjcf`: a machine in the formats of others."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 import typer
 
 from cspm.testbed import load_testbed
+from cspm_model.scene.mujoco_joints import mujoco_joints
 from cspm_msgs_py.errors import InputError
 from cspm_run.output.console import make_console, say
 
@@ -21,7 +22,20 @@ def urdf_command(testbed: str, out: Path | None) -> None:
     Raises:
         InputError: no such test-bed, or the file exists or cannot be written.
     """
-    text = load_testbed(testbed).urdf()
+    _hand_out(load_testbed(testbed).urdf(), out, "urdf")
+
+
+def mjcf_command(testbed: str, out: Path | None) -> None:
+    """Write a machine's winches as default classes of MuJoCo; arguments and errors as `cspm urdf`.
+
+    Raises:
+        InputError: as above.
+    """
+    _hand_out(mujoco_joints(load_testbed(testbed).description), out, "mjcf")
+
+
+def _hand_out(text: str, out: Path | None, kind: str) -> None:
+    """Print a document, or write it to a new file."""
     if out is None:
         typer.echo(text, nl=False)
         return
@@ -32,4 +46,4 @@ def urdf_command(testbed: str, out: Path | None) -> None:
         raise InputError(f"--out {out}: already exists, allowed: a new file") from None
     except OSError as err:
         raise InputError(f"--out {out}: cannot be written ({err.strerror})") from None
-    say(make_console(), f"urdf {out}")
+    say(make_console(), f"{kind} {out}")

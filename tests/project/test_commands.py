@@ -68,6 +68,10 @@ NOT_RUN: dict[str, str] = {
     "pip install": "needs a network; tests/project/test_wheel.py",
     "pip wheel": "needs a network; tests/project/test_wheel.py",
     "cspm info recordings/my_bag": "a bag of the reader; tests/cspm_ident/importing",
+    "cspm import log.": "logs of the reader; tests/cspm_ident/importing/test_actuator_logs.py",
+    "cspm identify winch swing": "a log of the reader; tests/cspm_ident/winch",
+    "cspm diagnose swing": "a log of the reader; tests/cspm/cli/test_diagnose.py",
+    "cspm mjcf fitted": "a fit of the reader; tests/cspm_model/scene/test_mujoco_joints.py",
     "cspm import my_bag": "a bag of the reader; tests/cspm_ident/importing",
 }
 

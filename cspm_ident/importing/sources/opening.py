@@ -12,7 +12,9 @@ from cspm_ident.importing.sources.bag_source import BagSource
 from cspm_ident.importing.sources.csv_source import CsvSource
 from cspm_ident.importing.sources.hdf5_source import Hdf5Source
 from cspm_ident.importing.sources.joined_source import JoinedSource
+from cspm_ident.importing.sources.json_source import JsonSource
 from cspm_ident.importing.sources.mat_source import MatSource
+from cspm_ident.importing.sources.npz_source import FROM_TORCH, NpzSource
 from cspm_ident.importing.sources.parquet_source import ParquetSource
 from cspm_ident.importing.sources.source import Source
 from cspm_ident.importing.sources.spreadsheet_source import SpreadsheetSource
@@ -36,7 +38,10 @@ _BENCHES = {
     ),
 }
 _OLD_OFFICE = b"\xd0\xcf\x11\xe0"
-ALLOWED = "allowed: a text table, .csv.gz, .xlsx, .parquet, .mat or HDF5 file, or a bag"
+_TORCH = (".pt", ".pth")
+ALLOWED = (
+    "allowed: a text table, .csv.gz, .json, .npz, .xlsx, .parquet, .mat or HDF5 file, or a bag"
+)
 
 
 def open_source(path: Path, mapping: MappingFile) -> Source:
@@ -95,6 +100,12 @@ def _binary_table(path: Path, start: bytes, form: CsvFormat) -> Source | None:
             raise InputError(f"{path}: {what}")
     if start.startswith(_PARQUET):
         return ParquetSource(path)
+    if path.suffix in _TORCH:
+        raise InputError(f"{path}: a file of PyTorch, allowed: {FROM_TORCH}")
+    if path.suffix == ".json":
+        return JsonSource(path)
+    if start.startswith(_ZIP) and path.suffix == ".npz":
+        return NpzSource(path)
     if start.startswith(_ZIP):
         return SpreadsheetSource(path, form)
     if start.startswith(_OLD_OFFICE):

@@ -10,7 +10,9 @@ from cspm_ident.importing.sources import bag_source, csv_source
 from cspm_msgs_py.errors import InputError
 
 STATE = "/winches/state"
-ALLOWED = "allowed: a text table, .csv.gz, .xlsx, .parquet, .mat or HDF5 file, or a bag"
+ALLOWED = (
+    "allowed: a text table, .csv.gz, .json, .npz, .xlsx, .parquet, .mat or HDF5 file, or a bag"
+)
 MAPPING = """
 name: rig
 csv: {%s}

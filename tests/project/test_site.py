@@ -1,6 +1,7 @@
 """The site is built from the pages without a warning, and nothing on it leads nowhere."""
 
 import importlib
+import json
 import re
 import subprocess
 import sys
@@ -152,3 +153,44 @@ def test_tutorials_are_listed_before_decisions(monkeypatch: pytest.MonkeyPatch) 
         dirname_to_title(place.name) for place in (ROOT / "docs").iterdir() if place.is_dir()
     }
     assert set(hook.SECTIONS) <= folders
+
+
+def test_a_notebook_is_a_page_with_its_code_and_what_it_gave(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "scripts"))
+    module = importlib.import_module("rendered_notebook")
+    cells = [
+        {"cell_type": "markdown", "source": ["# Title\n", "\n", "Text."]},
+        {
+            "cell_type": "code",
+            "source": ["1 + 1"],
+            "outputs": [
+                {"data": {"text/html": ["<table>\n\n</table>"], "text/plain": ["hidden"]}},
+                {"data": {"text/plain": ["2"]}},
+                {"data": {"image/png": "UE5H", "text/plain": ["hidden"]}},
+                {"name": "stderr", "text": ["noise"]},
+            ],
+        },
+    ]
+    text, pictures = module.rendered(json.dumps({"cells": cells}), "a.ipynb")
+    assert text == (
+        "# Title\n\n[Download this notebook](a.ipynb)\n\nText.\n\n"
+        "```python\n1 + 1\n```\n\n<table>\n</table>\n\n```text\n2\n```\n\n"
+        "![What the code draws](a_files/1.png)\n"
+    )
+    assert pictures == {"a_files/1.png": b"PNG"}
+
+
+def test_files_of_a_page_can_be_downloaded_and_notebooks_are_linked_as_pages(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "scripts"))
+    hook = importlib.import_module("site_links")
+    page = SimpleNamespace(file=SimpleNamespace(src_uri="how-to/a.md"))
+    text = "[N](../tutorials/n.ipynb)\n\n<!-- file: rig.yaml -->\n```yaml\nname: rig\n```\n"
+    found = hook.on_page_markdown(text, page)
+    assert found.startswith("[N](../tutorials/n.md)\n\n[Download `rig.yaml`](a_files/rig.yaml)\n")
+    assert found.endswith("```yaml\nname: rig\n```\n")
+    own = SimpleNamespace(file=SimpleNamespace(src_uri="tutorials/n.md"))
+    assert hook.on_page_markdown("[Download](n.ipynb)", own) == "[Download](n.ipynb)"

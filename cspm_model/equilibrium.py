@@ -61,7 +61,9 @@ def find_equilibrium(
 
     Where the cables cannot balance every moment (the thesis's machine, in roll), the roll is found
     at which gravity needs none; of a machine whose cables give still less, all that they do not
-    give. `load` is a wrench on the bar beside gravity's, (6,), world axes.
+    give. Where they balance one only with tensions beyond the limits, as of the same machine with
+    ends a little off, the coordinate in which they are weakest is found. `load` is a wrench on the
+    bar beside gravity's, (6,), world axes.
 
     Raises:
         ConvergenceError: no tensions within the limits hold the bar at rest near this pose.
@@ -74,6 +76,10 @@ def find_equilibrium(
             pose[ROLL] = _balanced_roll(parameters, pose, frame_pose, load)
         else:
             pose = _balanced_pose(parameters, pose, frame_pose, limits, load, free)
+    elif not _is_held(parameters, pose, frame_pose, limits, load):
+        weakest = _weakest_axis(parameters, pose, frame_pose)
+        near = _balanced_pose(parameters, pose, frame_pose, limits, load, [weakest])
+        pose = near if _is_held(parameters, near, frame_pose, limits, load) else pose
     tensions = _hold(parameters, pose, frame_pose, limits, load)
     lengths = geometry(parameters.cables, pose, frame_pose).lengths
     return Equilibrium(pose, tensions, unstretched_lengths(parameters, lengths, tensions))
@@ -166,6 +172,22 @@ def _excess_tension(
     scale = law_scale(elastic, cables, i)
     found, _ = elastic_tension(length - unstretched, elastic, scale, cables, tables, i)
     return float(found - tension)
+
+
+def _is_held(
+    parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array, load: Array
+) -> bool:
+    """Return whether tensions within the limits hold the bar at a pose."""
+    structure = -geometry(parameters.cables, pose, frame_pose).bar.T
+    wrench = -gravity_wrench(parameters, pose) - load
+    tensions = least_tensions(structure, wrench, limits)
+    return _residual(structure, tensions, wrench) <= RESIDUAL_TOLERANCE
+
+
+def _weakest_axis(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike) -> int:
+    """Return the coordinate in which the cables move the bar least per tension."""
+    structure = geometry(parameters.cables, pose, frame_pose).bar.T
+    return int(np.argmax(np.abs(np.linalg.svd(structure)[0][:, -1])))
 
 
 def _balanced(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, load: Array) -> bool:

@@ -87,6 +87,30 @@ def test_the_thesis_machine_rolls_to_where_it_hangs(thesis):
     assert sideways.bar_pose[3] != pytest.approx(0.3, abs=1e-3)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_thesis_machine_rolls_a_little_where_its_ends_are_a_millimetre_off(thesis, seed):
+    """Its cables then hold a little roll, and with tensions far beyond their limits any."""
+    rng = np.random.default_rng(seed)
+    off = thesis.model_copy(
+        update={
+            "cables": tuple(
+                cable.model_copy(
+                    update={
+                        "exit": tuple(rng.normal(cable.exit, 1e-3)),
+                        "attachment": tuple(rng.normal(cable.attachment, 1e-3)),
+                    }
+                )
+                for cable in thesis.cables
+            )
+        }
+    )
+    found = rest(off, CENTRE)
+    assert balance(off, found) == pytest.approx(0.0, abs=1e-6)
+    assert np.delete(found.bar_pose, 3) == pytest.approx(np.delete(CENTRE, 3), abs=0.0)
+    assert abs(found.bar_pose[3]) < 0.1
+    assert (found.tensions >= limits_of(off)[:, 0] - 1e-9).all()
+
+
 def test_a_machine_that_holds_every_moment_keeps_its_roll(general):
     pose = [0.0, 0.0, 2.0, 0.05, 0.0, 0.0]
     assert (rest(general, pose).bar_pose == pose).all()

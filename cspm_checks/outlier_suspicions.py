@@ -40,7 +40,8 @@ def outlier_suspicions(
     out = []
     if len(found.spikes) and (steady or _beyond_the_rest(values[rows], found.spikes)):
         text = f"{len(found.spikes)} samples leave and come back at once"
-        out.append(at_instants(where, "spike", text, seconds[found.spikes]))
+        spike = at_instants(where, "spike", text, seconds[found.spikes])
+        out.append(replace(spike, mend={where: {"spikes": "mask"}}))
     if len(found.zeros):
         text = f"{len(found.zeros)} samples are exactly 0 between others that are not"
         out.append(at_instants(where, "zero", text, seconds[found.zeros]))
@@ -65,7 +66,10 @@ def _jumps(channel: Channel, found: Outliers, values: Array, seconds: Array) -> 
     if len(jumps):
         shown = ", ".join(f"{size:+.6g}" for size in sizes[:SHOWN_SIZES])
         text = f"{len(jumps)} steps that no motion explains, {shown} {channel.quantity}: a reset?"
-        out.append(at_instants(channel.where, "jump", text, seconds[jumps]))
+        jump = at_instants(channel.where, "jump", text, seconds[jumps])
+        # Steps of which one is of a held value are not all resets.
+        mend = {} if let_go.any() else {channel.where: {"jumps": "join"}}
+        out.append(replace(jump, mend=mend))
     if let_go.any() and channel.field not in "xyz":
         text = f"its last value is held {let_go.sum()} times and then steps to where it is"
         held = at_instants(channel.where, "stuck", text, seconds[found.jumps[let_go]])
@@ -101,7 +105,8 @@ def _rollover(channel: Channel, found: Outliers, seconds: Array) -> Suspicion:
     text += f" ± {2 * error:.2g}" if error else ""
     one = at_instants(channel.where, "rollover", text, seconds)
     numbers = {**one.numbers, "period": period, "error": error}
-    return Suspicion(one.where, one.kind, one.text, numbers, one.at_s, f"`wrap: {wrap:.10g}`")
+    remedy, mend = f"`wrap: {wrap:.10g}`", {channel.where: {"wrap": wrap}}
+    return Suspicion(one.where, one.kind, one.text, numbers, one.at_s, remedy, mend)
 
 
 def nearest_round(value: float, error: float) -> float:

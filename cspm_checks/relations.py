@@ -150,7 +150,16 @@ def late_suspicions(where: str, leader: str, late: Lateness | None) -> list[Susp
         "drift": late.drift,
         "drift_error": late.drift_error,
     }
-    return [Suspicion(where, "late", text, numbers, mend={where: {"offset_s": -late.seconds}})]
+    return [late_suspicion(where, text, numbers)]
+
+
+def late_suspicion(where: str, text: str, numbers: dict[str, float]) -> Suspicion:
+    """Return a lateness with the offset of a clock, and for a drift the skew, that mend it."""
+    remedy = f"a `clock` of its own with `offset: {-numbers['seconds']:.6g}`"
+    if numbers.get("drift"):
+        remedy += f" and `skew: {-numbers['drift']:.3g}`"
+    mend = {where: {"offset_s": -numbers["seconds"]}}
+    return Suspicion(where, "late", text, numbers, remedy=remedy, mend=mend)
 
 
 def _position_pairs(

@@ -28,8 +28,8 @@ class _Listed(typer.core.TyperGroup):
     """Lists the commands in the order in which a newcomer needs them."""
 
     order = (
-        *("demo", "new", "run", "view", "info", "recover", "resim", "data", "import", "export"),
-        *("compare", "identify", "diagnose", "bundle", "merge", "campaign", "analyze"),
+        *("demo", "new", "run", "view", "info", "recover", "resim", "data", "check", "import"),
+        *("export", "compare", "identify", "diagnose", "bundle", "merge", "campaign", "analyze"),
         *("doctor", "schema", "migrate", "replay", "check-drivers", "urdf", "mjcf", "node"),
     )
 

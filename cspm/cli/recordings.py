@@ -83,6 +83,52 @@ def resim(
 
 
 @app.command(
+    epilog="""Examples:
+
+cspm check recordings/calm-20260131-120000
+
+cspm check lab.csv --mapping lab_mapping.yaml --testbed my_rig.yaml --fix lab_mended.yaml
+
+Exit code: 0 nothing looks wrong, 1 something does, 2 unusable input."""
+)
+def check(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="REC|FILE",
+            help="A recording, or with --mapping any file that `cspm import` reads.",
+        ),
+    ],
+    mapping: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Which column is which number, in which unit."),
+    ] = None,
+    testbed: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="The machine; otherwise the one that the recording carries."
+        ),
+    ] = None,
+    page: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A new .html file with what was found.")
+    ] = None,
+    fix: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A new file for the mapping with what mends it put in."),
+    ] = None,
+    json: Json = None,
+) -> None:
+    """Look at signals before any model. Say what looks wrong, when, and which key mends it.
+
+    Units, signs, clocks, lost samples; encoders against poses, load cells against torques.
+    """
+    from cspm.commands.recordings.check_command import Check, check_command
+
+    fine = check_command(Check(source, mapping, testbed, page, fix), json)
+    raise typer.Exit(0 if fine else RUN_FAILED)
+
+
+@app.command(
     "import",
     epilog="""Examples:
 

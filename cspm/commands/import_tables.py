@@ -27,11 +27,11 @@ def print_report(console: Console, report: ImportReport) -> None:
         _print_topic(console, topic)
     if not report.suspicions:
         say(console, "suspicions: none")
-    for (text, remedy), places in _by_text(report.suspicions).items():
+    for (text, remedy), places in suspicions_by_text(report.suspicions).items():
         say(console, f"suspicion: {', '.join(places)}: {text}; remedy: {remedy}")
 
 
-def _by_text(suspicions: list[Suspicion]) -> dict[tuple[str, str], list[str]]:
+def suspicions_by_text(suspicions: list[Suspicion]) -> dict[tuple[str, str], list[str]]:
     """Return the places of each suspicion, as one cable's fault often concerns all cables."""
     found: dict[tuple[str, str], list[str]] = {}
     for one in suspicions:

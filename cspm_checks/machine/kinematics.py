@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from cspm_checks.coarse_lateness import CoarseShift, coarse_shift
+from cspm_checks.machine.coarse_lateness import CoarseShift, coarse_shift
 from cspm_checks.machine.encoder_order import encoder_faults, late_reversals
 from cspm_checks.machine.misfit import Winding, scatter
 from cspm_checks.machine.pose_readings import Reading, readings

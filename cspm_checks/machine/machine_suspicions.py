@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_checks.coarse_lateness import coarse_shift
 from cspm_checks.lateness import LONGEST_S
 from cspm_checks.machine.cell_drift import cell_drift
 from cspm_checks.machine.cell_order import STATE, TENSION, cell_suspicions
+from cspm_checks.machine.coarse_lateness import coarse_shift
 from cspm_checks.machine.kinematics import kinematic_suspicions
 from cspm_checks.machine.misfit import Winding
 from cspm_checks.machine.poses import bodies
+from cspm_checks.relations import late_suspicion
 from cspm_checks.series import Log, SensorSeries, series_of
 from cspm_checks.suspicion import Suspicion
 from cspm_msgs_py.testbed import Testbed
@@ -62,7 +63,7 @@ def _late_cells(log: Log, testbed: Testbed, origin_ns: int) -> list[Suspicion]:
     text = f"all load cells are {abs(found.seconds):.4g} ± {found.step:.2g} s {which} against the"
     text += f" torques, with which they then correlate by {found.correlation:.2f}"
     numbers = {"seconds": found.seconds, "error": found.step}
-    return [Suspicion(TENSION, "late", text, numbers, mend={TENSION: {"offset_s": -found.seconds}})]
+    return [late_suspicion(TENSION, text, numbers)]
 
 
 def _table(series: list[SensorSeries]) -> Array:

@@ -173,7 +173,8 @@ def _series(
             continue
         raw, unwrapper = store.column(field.column), field.conversion.unwrapper()
         clock = times[(field.clock, field.stamps, len(raw))]
-        name = f"{topic} {field.name}"
+        # Columns of a file may have any name but one that begins so.
+        name = f"\0{topic} {field.name}"
         for part in pieces(len(raw), raw):
             store.append(name, field.conversion.apply(np.asarray(raw[part]), unwrapper))
         if unwrapper is not None:

@@ -181,7 +181,7 @@ def _field(
 ) -> PlannedField:
     if given.column is None:
         return PlannedField(name, None, given.constant)
-    chosen = given.clock or _own_clock(given.column, clocks, files, where)
+    chosen = given.clock or own_clock(given.column, clocks, files, where)
     clock = clocks[chosen]
     if clock.stamp is not None:
         stamps: tuple[str, ...] = (source.stamp_column(given.column, clock.stamp),)
@@ -196,7 +196,7 @@ def _field(
     return PlannedField(name, given.column, None, conversion, given, chosen, stamps, logged)
 
 
-def _own_clock(column: str, clocks: dict[str, Clock], files: Collection[str], where: str) -> str:
+def own_clock(column: str, clocks: dict[str, Clock], files: Collection[str], where: str) -> str:
     """Return the first clock that can be of a column's file."""
     for name, clock in clocks.items():
         if _is_of_its_file(clock, column, files):

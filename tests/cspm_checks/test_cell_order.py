@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from machine_logs import BAR, CELLS, changed, healthy, later, told
 
-from cspm_checks.coarse_lateness import coarse_shift
 from cspm_checks.hum import mains_hum
+from cspm_checks.machine.coarse_lateness import coarse_shift
 from cspm_checks.series import SensorSeries
 
 

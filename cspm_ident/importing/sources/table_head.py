@@ -21,7 +21,7 @@ LOOKALIKES = str.maketrans(_OTHER_BLANKS + "\u2212\ufeff", " " * len(_OTHER_BLAN
 
 
 class TableHead(NamedTuple):
-    """What stands above the numbers.
+    """What is above the numbers.
 
     Attributes:
         cells: of the line of names, or of the first line of numbers where there are no names.
@@ -37,7 +37,7 @@ class TableHead(NamedTuple):
 
 
 def table_head(file: TextIO, form: CsvFormat, path: Path) -> TableHead:
-    """Return what stands above the numbers of a table.
+    """Return what is above the numbers of a table.
 
     A first line `sep=;` names the delimiter; names in quotes may go over several lines; a line of
     units below the names is passed over, unless the mapping says where the numbers begin.

@@ -38,6 +38,14 @@ from bench.results.result_measures import (
     possible_share,
     tracking,
 )
+from bench.results.result_ratios import (
+    ROUGHEST_PLAN,
+    ROUGHEST_SEED,
+    beam_ratios,
+    deep_ratios,
+    first_limit,
+    six_figures,
+)
 from bench.results.result_robust_cases import (
     ADAPTED,
     INFORMED,
@@ -45,19 +53,6 @@ from bench.results.result_robust_cases import (
     PAYLOADS,
     changed,
     corrected,
-)
-from bench.results.result_sentences import (
-    ROUGHEST_PLAN,
-    ROUGHEST_SEED,
-    beam_said,
-    causes_said,
-    corrected_said,
-    deep_said,
-    late_said,
-    payload_said,
-    six_said,
-    touched_said,
-    winch_said,
 )
 from bench.results.result_store import Measurement
 from bench.results.result_tables import (
@@ -99,10 +94,10 @@ def blocks_of(seeds: int) -> dict[str, Block]:
         "switched": _tracked("switched", SWITCHED),
         "fastest": Block({}, fastest_block),
         "switched_gains": _tracked("switched gains", SWITCHED_GAINS),
-        "switched_calm": _tracked("switched calm", SWITCHED_CALM, _and(beam_said)),
+        "switched_calm": _tracked("switched calm", SWITCHED_CALM, _and(beam_ratios)),
         "switched_4m": _tracked("switched 4 m", SWITCHED_4M),
         "distribution": _distribution(),
-        "causes": _tracked("causes", CAUSES, _and(causes_said)),
+        "causes": _tracked("causes", CAUSES),
         "beyond": _tracked("beyond", BEYOND),
         "at_four_metres": _tracked("beyond", AT_FOUR_METRES),
         "planned": _planned(),
@@ -110,23 +105,22 @@ def blocks_of(seeds: int) -> dict[str, Block]:
         "rough_corners": _tracked("rough corners", ROUGH_CORNERS, extremes_block),
         "designed_there": _tracked("designed there", DESIGNED_THERE, extremes_block),
         "friction": _tracked("friction", with_and_without(FRICTION, AHEAD, "fed forward")),
-        "winch": _tracked("winch", wound(), _and(winch_said)),
+        "winch": _tracked("winch", wound()),
         "limit": Block({name: _limit(name, case) for name, case in LIMITED.items()}, limit_block),
         "possible": _possible(),
         "possible_six": _possible_six(),
         "kept": _kept_in_six(seeds),
-        "changes": Block({"worst case": _limit("worst case", LIMITED["worst case"])}, touched_said),
-        "robust": _tracked("robust", changed(PAST), _and(late_said)),
+        "changes": Block({"worst case": _limit("worst case", LIMITED["worst case"])}, first_limit),
+        "robust": _tracked("robust", changed(PAST)),
         "moved_on": _moved_on(),
         "informed": _tracked("informed", INFORMED),
-        "corrected": _tracked("corrected", corrected(), _and(corrected_said)),
+        "corrected": _tracked("corrected", corrected()),
         "adapted": _tracked(
             "adapted", with_and_without(MASSES, ADAPTED, "estimated from its heave")
         ),
         "payload": _tracked(
             "payload",
             with_and_without(PAYLOADS, ADAPTED, "estimated from its heave"),
-            _and(payload_said),
         ),
         "robust_thesis": _tracked("robust thesis", changed("worst_case_steep")),
         "past": _past("1000 Hz", seeds),
@@ -153,9 +147,9 @@ def _tracked(group: str, cases: Cases, write: Callable[[Found], str] = tracking_
     )
 
 
-def _and(said: Callable[[Found], str]) -> Callable[[Found], str]:
-    """Return what writes a row per run, and below them what is said of them."""
-    return lambda found: f"{tracking_block(found)}\n\n{said(found)}"
+def _and(more: Callable[[Found], str]) -> Callable[[Found], str]:
+    """Return what writes a row per run, and below them a table that follows from them."""
+    return lambda found: f"{tracking_block(found)}\n\n{more(found)}"
 
 
 def _distribution() -> Block:
@@ -175,14 +169,14 @@ def _possible() -> Block:
 
 def _planned() -> Block:
     return Block(
-        {**_tracked("beyond", AT_FOUR_METRES).measurements, **_possible().measurements}, deep_said
+        {**_tracked("beyond", AT_FOUR_METRES).measurements, **_possible().measurements}, deep_ratios
     )
 
 
 def _kept_in_six(seeds: int) -> Block:
     least = {ROUGHEST_PLAN: _possible().measurements[ROUGHEST_PLAN]}
     enough = max(seeds, int(ROUGHEST_SEED.split()[1]))
-    return Block({**_past_six(enough).measurements, **least}, six_said)
+    return Block({**_past_six(enough).measurements, **least}, six_figures)
 
 
 def _possible_six() -> Block:

@@ -36,6 +36,14 @@ def reported(found, kind):
 OUT = {"spike", "zero", "jump", "rollover", "mended"}
 
 
+@pytest.mark.parametrize(("size", "places"), [(10.0, []), (30.0, [400])])
+def test_what_noise_cannot_do_is_a_spike_and_what_it_can_is_none(size, places):
+    """Of white noise with a standard deviation of 1."""
+    values = np.random.default_rng(2).standard_normal(1000)
+    values[400] = size
+    assert outliers_of(values, np.ones(999, dtype=bool)).spikes.tolist() == places
+
+
 def test_nothing_is_found_in_a_clean_recording(tmp_path):
     assert read(tmp_path).kinds.isdisjoint(OUT)
 

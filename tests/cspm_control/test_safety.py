@@ -253,6 +253,19 @@ def test_an_input_is_stale_after_the_time_that_the_file_says():
     assert stage.status().message.endswith(reason)
 
 
+@pytest.mark.parametrize(("age", "known"), [(50, True), (51, False)])
+def test_speeds_are_held_against_for_no_longer_than_that(age, known):
+    torques = []
+    for speed in (-1.0, 1.0):
+        stage, sent = torque_stage("safety.stale_after=0.05"), Sent()
+        stage.step(0, winch_row(speed=speed), sent)
+        stage.trip(0, "no reason")
+        stage.watch(age * MS, {}, sent)
+        torques.append(sent.torques[-1][0])
+    assert (torques[0] > torques[1]) == known
+    assert (torques[0] != torques[1]) == known
+
+
 # The emergency stop that repeats itself
 
 

@@ -69,6 +69,16 @@ def test_at_rest_a_bias_cannot_be_distinguished_from_a_weak_drive():
     np.testing.assert_allclose(found.values, 1.0 / (1.0 + (0.3 * 5.0) ** 2), atol=0.02)
 
 
+def test_a_balance_is_believed_as_far_as_what_it_leaves_unexplained_allows():
+    """The same at rest after 30 ms, by a batch: 0.1 N within 10 rad/s are 2 N² in a sample."""
+    found = LoadCellBias(RADII, INERTIAS, 2.0, period=PERIOD)
+    for _ in range(31):
+        found.step(np.full(2, 6.0), np.zeros(2), RADII * 5.0)
+    share = 1.0 - np.exp(-10.0 * PERIOD * np.arange(1, 31))
+    prior, taken = 1.0 + (0.3 * 5.0) ** 2, np.sum(share**2)
+    np.testing.assert_allclose(found.values, taken / (prior * taken + 2.0), rtol=1e-3)
+
+
 def test_after_a_restart_what_was_learnt_stays():
     found = LoadCellBias(RADII, INERTIAS, 2.0, period=PERIOD)
     measured, speeds, torques = winches(8.0, bias=0.7)

@@ -57,6 +57,21 @@ def test_every_effect_has_an_equal_part_of_the_false_alarms():
     assert spent == pytest.approx(RATE)
 
 
+def test_an_onset_is_as_much_surer_as_there_are_instants_to_begin_at():
+    """Of friction in more and more of the hum: none is reported, then all but onsets, then all."""
+    own, found = Candidate(DRY, "two"), []
+    both = Hypothesis(DRY, (own,)), Hypothesis(DRY, (own,), onset=3)
+    thresholds = replace(DEFAULT_THRESHOLDS, material_share=1e-3)
+    for second in (0.03, 0.08, 0.2):
+        search = Search(gather([winches(second)], BLOCK_S), thresholds=thresholds)
+        base, columns = search.fits.columns([]), search.fits.gram.columns_of([own])
+        gain, most = search.sums.gain(base, columns), search.significance.below(DRY)
+        chance = search.sums.p_value(base, columns)
+        found.append([search.significance.counts(base, each, gain) for each in both])
+        assert found[-1] == [chance < most, chance < most / search.sums.blocks]
+    assert found == [[False, False], [True, False], [True, True]]
+
+
 @pytest.mark.parametrize(("second", "elements"), [(0.3, NAMES), (0.0, NAMES[:1])])
 def test_what_is_little_on_one_element_is_reported_of_all_if_one_number_is_better(second, elements):
     """In the hum of the other winch the same friction is a tenth of the squares and less."""

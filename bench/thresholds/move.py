@@ -31,11 +31,6 @@ class Move(NamedTuple):
         moved: dict[str, Any] = {self.name: self.value}
         return replace(DEFAULT_THRESHOLDS, **moved)
 
-    @property
-    def is_up(self) -> bool:
-        """Whether the value is larger than the default."""
-        return self.value > DEFAULT_THRESHOLDS.values[self.name]
-
 
 def moves(share: float = SHARE) -> Iterator[Move]:
     """Yield every threshold down and up by a share of its value, clipped to its allowed range.

@@ -32,7 +32,22 @@ function draw(now) {
   timeline.value = Math.round(state.time / step());
   timeline.setAttribute("aria-valuetext", `${state.time.toFixed(2)} s`);
   by("clock").textContent = `${state.time.toFixed(2)} of ${longest().toFixed(1)} s`;
+  by("marked").textContent = markedLine();
   by("status").textContent = statusLine();
+}
+
+/** The first marked part with its reading now; beside a second run also how far that differs. */
+function markedLine() {
+  const own = plots.filter(plot => plot.guilty.size);
+  const torques = view.marks[0] && view.marks[0].kind === "winch" ? /torque/i : /./;
+  const plot = own.find(each => torques.test(each.group.title)) || own[0];
+  if (!plot) return "";
+  const { names, title, unit, parts } = plot.group;
+  const i = names.findIndex(name => plot.guilty.has(name));
+  const [here, other] = parts.map(({ run, trace }) => valuesAt(run, trace.title, frameAt(run, state.time)));
+  if (!here) return "";
+  const reading = `${inWords(names[i])}, ${title.toLowerCase()}: ${shortNumber(here[i])} ${unit}`;
+  return other ? `${reading}, residual ${shortNumber(here[i] - other[i])} ${unit}` : reading;
 }
 
 const step = () => view.runs[0].period;

@@ -3,6 +3,7 @@
 
 const MARGIN = { left: 52, right: 8, top: 8, bottom: 20 };
 const range = { from: 0, to: 1 };
+const FEW = 3;
 
 /** All titles of the runs' traces, each with the runs that have it. */
 function groups() {
@@ -20,6 +21,8 @@ class Plot {
     const marked = group.names.filter(name => view.marks.some(mark => mark.element === name));
     this.guilty = new Set(marked);
     this.hidden = new Set();
+    // Bands of many lines merge; those of few show the spread.
+    this.banded = group.names.length <= FEW;
     this.still = document.createElement("canvas");
     const place = document.createElement("div");
     place.className = "plot";
@@ -54,6 +57,17 @@ class Plot {
       this.chips.append(chip);
       return { swatch, reading };
     });
+    const band = document.createElement("button");
+    band.className = "band";
+    band.textContent = "bands";
+    band.title = "from least to greatest value between two points of a line";
+    band.setAttribute("aria-pressed", String(this.banded));
+    band.addEventListener("click", () => {
+      this.banded = !this.banded;
+      band.setAttribute("aria-pressed", String(this.banded));
+      this.redraw();
+    });
+    this.chips.append(band);
   }
 
   attach(scrub) {
@@ -124,7 +138,7 @@ class Plot {
     this.still.getContext("2d").drawImage(this.canvas, 0, 0);
   }
 
-  /** The middle as a line, and around it the band between least and greatest value. */
+  /** The middle as a line, and on demand the band between least and greatest value around it. */
   line(pen, { run, index, trace }, i, y) {
     const wide = trace.names.length, faint = this.guilty.size && !this.guilty.has(trace.names[i]);
     const x = k => this.x(k * run.period);
@@ -140,7 +154,7 @@ class Plot {
       }
       for (let k = last; k >= first; k--) outline.push([x(k), y(trace.low[wide * k + i])]);
       pen.globalAlpha = (faint ? 0.25 : 1) * (index ? 0.15 : 0.4);
-      pen.fill(pathOf(outline));
+      if (this.banded) pen.fill(pathOf(outline));
       pen.globalAlpha = faint ? 0.35 : 1;
       pen.stroke(pathOf(middle));
     }

@@ -140,7 +140,7 @@ function cableShapes(run, index, frame, cable, i, ends, project) {
       };
       if (index > 0) { line(colourOfRun(index), 1.2, []); return; }
       if (marked) { pen.globalAlpha = 0.35; line(css("--mark"), 12, []); pen.globalAlpha = 1; }
-      if (slack) line(css("--soft"), 2, [6, 5]);
+      if (slack) line(css("--text"), 2.5, [9, 8]);
       else line(tension === null ? css("--soft") : rampColour(share), 2 + 2.5 * share, []);
     },
   }];

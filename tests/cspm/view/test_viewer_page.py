@@ -52,6 +52,9 @@ def test_the_page_is_whole_and_calls_nobody(rest, tmp_path):
     assert len(POLICY.findall(page)) == 1
     assert "connect-src" not in POLICY.search(page)[0]
     assert not re.search(r"(?:src|href)\\s*=|https?://", page)
+    # Over the picture the buttons would hide winches and names.
+    assert page.index("id=views") < page.index("id=scene")
+    assert not re.search(r"#views \{[^}]*absolute", page)
     # Names from outside end no script.
     assert "Winch surge 2 has </script>" not in page
     head = json.loads(re.search(r"id=view>(.*?)</script>", page, re.DOTALL)[1])
@@ -77,6 +80,10 @@ def test_the_page_marks_the_part_and_follows_keys(rest, browser, tmp_path):
     assert found["finding"] == MARK.statement
     assert found["jumps"] == ["Where it shows: winch surge 2, 0.7 s"]
     assert browser.run(CLOCK).startswith("0.70 of 2.0 s")
+    marked = browser.run("return document.getElementById('marked').textContent")
+    assert re.fullmatch(r"surge 2, motor torques: −?[\d.]+ N·m", marked)
+    bands = "return [...document.querySelectorAll('.band')].map(each => each.ariaPressed)"
+    assert "false" in browser.run(bands)
     assert clock(browser, "Home") == "0.00"
     assert clock(browser, "ArrowRight", "ArrowRight") == "0.07"
     assert clock(browser, "End") == "2.00"

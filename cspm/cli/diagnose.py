@@ -23,6 +23,8 @@ cspm diagnose monday tuesday --testbed my_rig.yaml --json diagnosis.json
 
 cspm diagnose --explain winch_coulomb_friction
 
+cspm diagnose --plan rest --duration 20
+
 Exit code: 0 done, whatever the verdict; 2 unusable input, 130 interrupted.""",
 )
 def diagnose(
@@ -50,6 +52,19 @@ def diagnose(
         str | None,
         typer.Option(metavar="EFFECT", help="Say what an effect is and how it shows; no more."),
     ] = None,
+    plan: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENARIO",
+            help="Say what a motion could show, before it is recorded: the detection limits.",
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS", min=1.0, help="Of --plan; otherwise the scenario's, at most 60 s."
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -74,8 +89,19 @@ def diagnose(
 
         explain_command(explain)
         return
+    if plan is not None:
+        if recordings or held_out or out is not None:
+            raise InputError("diagnose: --plan beside recordings or --out, allowed: --plan alone")
+        from cspm.commands.analysis.plan_command import plan_command
+
+        plan_command(plan, testbed, duration, json)
+        return
+    if duration is not None:
+        raise InputError("diagnose: --duration of recordings, allowed: with --plan")
     if not recordings:
-        raise InputError("diagnose: no recording, allowed: one or more, or --explain EFFECT")
+        raise InputError(
+            "diagnose: no recording, allowed: one or more, --explain EFFECT or --plan SCENARIO"
+        )
     role = SEARCHED if held_out else SPLIT
     begin_judged(role, recordings, held_out or (), testbed, out)
     from cspm.commands.diagnose_command import DiagnoseRequest, diagnose_command

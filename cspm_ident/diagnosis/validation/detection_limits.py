@@ -13,8 +13,10 @@ from cspm_ident.diagnosis.finding import Finding
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.search import Search
+from cspm_sim.effects import Effect, EffectParameter
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 
 class Limit(NamedTuple):
@@ -38,43 +40,44 @@ class Limit(NamedTuple):
 
 
 def detection_limits(search: Search, kept: Sequence[Finding]) -> tuple[Limit, ...]:
-    """Return the limit of every effect with one coefficient on every element that shows it.
+    """Return the limit of each parameter of every effect on every element that shows it.
 
     At the limit the effect, beside the findings, reaches the search's significance over blocks and
-    its material share of a residual. Of several shapes, the one with the lowest limit counts.
+    its material share of a residual. Of several parameters each has its limit beside the others;
+    one that a healthy machine has too has to exceed what that may have. Of several shapes, the one
+    with the lowest limit counts.
     """
     base = search.fits.columns(each.hypothesis for each in kept)
-    best: dict[tuple[str, str], Limit] = {}
+    best: dict[tuple[str, str, str], Limit] = {}
     for candidate in search.heard:
-        columns = search.gram.columns_of([candidate])
-        if (
-            len(columns) != 1
-            or candidate.effect.signature.coefficients
-            or np.isin(columns, base).any()
-        ):
+        columns, effect = search.gram.columns_of([candidate]), candidate.effect
+        if effect.signature.coefficients or np.isin(columns, base).any():
             continue
-        limit = _limit(candidate, _least(search, candidate, base))
-        key = limit.effect, limit.element
-        if key not in best or limit.least < best[key].least:
-            best[key] = limit
+        for k, parameter in enumerate(effect.linear):
+            beside = np.concatenate([base, np.delete(columns, k)])
+            least = _least(search, effect, beside, columns[k : k + 1])
+            limit = _limit(candidate, parameter, least)
+            key = limit.effect, limit.element, limit.parameter
+            if key not in best or limit.least < best[key].least:
+                best[key] = limit
     return tuple(sorted(best.values()))
 
 
-def _least(search: Search, candidate: Candidate, base: NDArray[np.intp]) -> float:
+def _least(search: Search, effect: Effect, base: Index, column: Index) -> float:
     """Return the smallest weight that would be reported."""
-    sums, columns = search.sums, search.gram.columns_of([candidate])
-    error = float(np.sqrt(sums.covariance(base, columns)[0, 0]))
-    chance = search.significance.below(candidate.effect)
+    sums, gram = search.sums, search.gram
+    error = float(np.sqrt(sums.covariance(base, column)[0, 0]))
+    chance = search.significance.below(effect)
     sure = error * float(t_distribution.ppf(1.0 - chance / 2.0, max(1, sums.blocks - 1)))
     share = search.thresholds.material_share
-    return max(sure, _material(search.gram, base, sums.weights(base), columns, share))
+    return max(sure, _material(gram, base, sums.weights(base), column, share))
 
 
 def _material(
     gram: BlockGram,
-    base: NDArray[np.intp],
+    base: Index,
     weights: Array,
-    columns: NDArray[np.intp],
+    columns: Index,
     share: float,
 ) -> float:
     """Return the smallest weight that explains a given share of the squares of one residual."""
@@ -94,9 +97,10 @@ def _material(
     return least
 
 
-def _limit(candidate: Candidate, least: float) -> Limit:
-    (parameter,) = candidate.effect.linear
+def _limit(candidate: Candidate, parameter: EffectParameter, least: float) -> Limit:
     absent = parameter.absent or 0.0
+    low, high = candidate.effect.signature.negligible.get(parameter.name, (0.0, 0.0))
+    least += min(-low, high)
     possible = bool(absent + least <= parameter.maximum or absent - least >= parameter.minimum)
     return Limit(
         candidate.effect_id, candidate.element, parameter.name, least, parameter.unit, possible

@@ -52,14 +52,14 @@ def make_command(
 
     console = make_console()
     options = Request(folder, truth, seed, count, split, strata or tuple(STRATA), duration, sensors)
-    with _bar(console) as show:
+    with progress_bar(console) as show:
         make(options, show, jobs)
 
 
 def run_command(folder: Path, methods: Sequence[str], jobs: int | None) -> None:
     """Diagnose a benchmark's recordings; see `run`."""
     console = make_console()
-    with _bar(console) as show:
+    with progress_bar(console) as show:
         failed = run(folder, show, methods, jobs)
     for name, reason in failed.items():
         say(console, f"{name}: {reason}")
@@ -115,7 +115,7 @@ def _compared(
 
 
 @contextmanager
-def _bar(console: Console) -> Iterator[Callable[[str, int, int], None]]:
+def progress_bar(console: Console) -> Iterator[Callable[[str, int, int], None]]:
     """Give what shows progress with the time left; where nobody looks, one line per change."""
     with Progress(
         TextColumn("{task.description}"),

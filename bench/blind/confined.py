@@ -80,7 +80,7 @@ def main() -> None:
     confine(Path.cwd())
     from bench.blind.scoring.method import Methods
 
-    bench = Methods(Path(recording))
+    bench = Methods([Path(recording)])
     for name in methods:
         try:
             reported, seconds = bench.diagnosis_by(name)

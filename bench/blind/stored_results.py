@@ -19,9 +19,14 @@ def tried(folder: Path, methods: Sequence[str]) -> list[str]:
 
 
 def read_results(
-    folder: Path, names: Sequence[str], method: str = CSPM
+    folder: Path, names: Sequence[str] | None, method: str = CSPM
 ) -> Mapping[str, Mapping[str, Any]]:
     """Return, by recording, `diagnosis` (None: it failed) and `times`; only what was diagnosed.
+
+    Args:
+        folder: the benchmark's.
+        names: of the truth; None: any.
+        method: whose results.
 
     Raises:
         InputError: there are no results, or they are of another benchmark.
@@ -32,7 +37,7 @@ def read_results(
         raise InputError(
             f"{folder}: no {place.name}, allowed: a folder after `python -m bench.blind run`"
         )
-    strange = sorted(set(found) - set(names))
+    strange = sorted(set(found) - set(found if names is None else names))
     if strange:
         raise InputError(f"{place}: {strange[0]} is not in the truth, allowed: its own recordings")
     return {name: _read(place / name) for name in found}

@@ -14,6 +14,7 @@ from cspm_msgs_py.yaml_file import dump_yaml
 HERE = Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
 _OURS = "repository:"
+SEARCH, HELD_OUT = "search", "held_out"
 
 Range = tuple[float, float]
 
@@ -50,24 +51,37 @@ class Dataset(NamedTuple):
         found = (root / self.folder for root in roots)
         return next((each for each in found if each.is_dir()), None)
 
-    def imported(self, place: Path, work: Path) -> tuple[list[Path], list[Path]]:
-        """Import the recordings into a folder; return those to search and those held out."""
-        testbed = self._testbed(place, work)
-        folders = []
-        for file in (*self.search, *self.held_out):
-            out = work / Path(file).stem
-            mapping = _file(place, self.mapping)
-            cspm.import_recording(place / file, out, mapping=mapping, testbed=testbed)
-            folders.append(out)
-        return folders[: len(self.search)], folders[len(self.search) :]
+    def imported(
+        self,
+        place: Path,
+        work: Path,
+        tables: Path | None = None,
+        description: Mapping[str, Any] | None = None,
+    ) -> tuple[list[Path], list[Path]]:
+        """Import the recordings into a folder; return those to search and those held out.
 
-    def _testbed(self, place: Path, work: Path) -> Path:
+        Args:
+            place: the data set's folder.
+            work: a folder.
+            tables: where the recordings are; None: in the data set's folder.
+            description: contents of another test-bed file.
+        """
+        testbed, mapping = work / "testbed.yaml", _file(place, self.mapping)
+        testbed.write_text(dump_yaml(description or self.description(place)), "utf-8")
+        found = []
+        for role, files in ((SEARCH, self.search), (HELD_OUT, self.held_out)):
+            folders = [work / role / Path(file).stem for file in files]
+            for file, out in zip(files, folders, strict=True):
+                table = (tables or place) / file
+                cspm.import_recording(table, out, mapping=mapping, testbed=testbed)
+            found.append(folders)
+        return found[0], found[1]
+
+    def description(self, place: Path) -> dict[str, Any]:
+        """Return the contents of the test-bed file."""
         content: dict[str, Any] = yaml.safe_load(_file(place, self.testbed).read_text("utf-8"))
         kept = [each for each in content.get("effects", ()) if each["effect"] not in self.without]
-        content["effects"] = kept
-        path = work / "testbed.yaml"
-        path.write_text(dump_yaml(content), "utf-8")
-        return path
+        return content | {"effects": kept}
 
 
 def datasets() -> list[Dataset]:

@@ -48,9 +48,17 @@ class Table(StrictModel):
 
 
 class Machine(StrictModel):
-    """A test-bed file and a mapping of this project, and the tables that they are for."""
+    """Test-bed files and a mapping of this project, and the tables that they are for.
+
+    Attributes:
+        testbed: as a newcomer writes it.
+        known: with all terms that are known.
+        mapping: of the tables.
+        tables: of the same machine, independent runs.
+    """
 
     testbed: str
+    known: str
     mapping: str
     tables: list[str]
 

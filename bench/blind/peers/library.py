@@ -45,19 +45,41 @@ class Library(NamedTuple):
         ]
 
 
-def library_of(measurement: Measurement) -> Library:
-    """Return the library of a recording, with all of the catalogue.
+def library_of(
+    measurements: Sequence[Measurement], held_out: Sequence[Measurement] = ()
+) -> Library:
+    """Return the library of recordings, with all of the catalogue.
+
+    Args:
+        measurements: what is searched.
+        held_out: what is judged; if empty, the last part of what is searched.
 
     Raises:
-        InputError: the recording has no residual.
+        InputError: a recording has no residual.
     """
-    parts = [equations_of(measurement, list(catalogue().values()))]
-    if not parts[0]:
-        raise InputError(f"{measurement.path}: no residual, allowed: recordings to be diagnosed")
-    first, last = steady(first_part(parts)), last_part(parts)
+    parts = [_equations(each) for each in measurements]
+    first = steady(parts if held_out else first_part(parts))
+    last = [_equations(each) for each in held_out] or last_part(parts)
     noise = noise_of(first)
-    (searched,), (judge,) = in_noise(first, noise), in_noise(last, noise)
-    start, end = span_of(searched)
-    block = (end - start) / DEFAULT_THRESHOLDS.block_count
-    gram = gather([searched], block)
-    return Library(searched, judge, gram, WhiteSums(gram), gather([judge], block))
+    searched, judge = in_noise(first, noise), in_noise(last, noise)
+    block = sum(_length(part) for part in searched) / DEFAULT_THRESHOLDS.block_count
+    gram = gather(searched, block)
+    return Library(
+        [e for part in searched for e in part],
+        [e for part in judge for e in part],
+        gram,
+        WhiteSums(gram),
+        gather(judge, block),
+    )
+
+
+def _equations(measurement: Measurement) -> list[Equation]:
+    found = equations_of(measurement, list(catalogue().values()))
+    if not found:
+        raise InputError(f"{measurement.path}: no residual, allowed: recordings to be diagnosed")
+    return found
+
+
+def _length(part: Sequence[Equation]) -> float:
+    start, end = span_of(part)
+    return end - start

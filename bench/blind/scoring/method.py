@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
@@ -49,16 +49,23 @@ def require_method(name: str) -> None:
 
 
 class Methods:
-    """Methods on one recording; what several of them need is worked out once."""
+    """Methods on the recordings of one machine; what several of them need is worked out once."""
 
-    def __init__(self, recording: Path) -> None:
-        """Take the recording's folder.
+    def __init__(self, searched: Sequence[Path], held_out: Sequence[Path] = ()) -> None:
+        """Take the recordings' folders.
+
+        Args:
+            searched: what may be searched.
+            held_out: what is judged; if empty, the last part of what is searched.
 
         Raises:
-            InputError: it cannot be read.
+            InputError: one cannot be read.
         """
-        self._measurement = read_measurement(recording)
-        self._before = process_time()
+        begun = process_time()
+        self._searched = [read_measurement(each) for each in searched]
+        self._held_out = [read_measurement(each) for each in held_out]
+        # A process may have worked on others before.
+        self._before = process_time() - begun
         self._library_cost = 0.0
 
     def diagnosis_by(self, name: str) -> tuple[dict[str, Any], float]:
@@ -78,14 +85,15 @@ class Methods:
             reported: dict[str, Any] = import_module(_PEERS[name][0]).diagnosis_of(library)
             return reported, self._before + self._library_cost + process_time() - begun
         if name == CSPM:
-            found = diagnose([self._measurement])
+            found = diagnose(self._searched, self._held_out)
         else:
-            found = diagnose_without(self._measurement, name.removeprefix(_WITHOUT))
+            (measurement,) = self._searched
+            found = diagnose_without(measurement, name.removeprefix(_WITHOUT))
         return diagnosis_data(found), self._before + process_time() - begun
 
     @cached_property
     def _library(self) -> Library:
         begun = process_time()
-        library = library_of(self._measurement)
+        library = library_of(self._searched, self._held_out)
         self._library_cost = process_time() - begun
         return library

@@ -91,6 +91,7 @@ def get(publisher, monkeypatch, capsys, tmp_path):
         "machines": [
             {
                 "testbed": "pendulum.yaml",
+                "known": "pendulum_known.yaml",
                 "mapping": "pendulum_mapping.yaml",
                 "tables": ["ddp.csv"],
             }
@@ -197,11 +198,11 @@ def test_every_machine_of_the_list_can_be_read_and_is_for_tables_that_there_are(
         for machine in source.machines:
             assert {*machine.tables} <= made
             load_testbed(MACHINES / name / machine.testbed)
+            assert load_testbed(MACHINES / name / machine.known).testbed.effects
             load_mapping(MACHINES / name / machine.mapping)
     machines = [m for source in sources.sources().values() for m in source.machines]
-    assert len({m.testbed for m in machines} | {m.mapping for m in machines}) == sum(
-        1 for _ in MACHINES.glob("*/*.yaml")
-    )
+    named = {name for m in machines for name in (m.testbed, m.known, m.mapping)}
+    assert len(named) == sum(1 for _ in MACHINES.glob("*/*.yaml"))
 
 
 @pytest.mark.parametrize("name", sources.sources())

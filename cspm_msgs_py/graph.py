@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from cspm_msgs_py.schedule import (
@@ -53,8 +53,9 @@ def graph_of(schedule: Schedule, nodes: Sequence[str]) -> dict[str, Edges]:
             for topic in plan.outputs:
                 readers[topic].append(PLAYER)
         for topic in (*plan.inputs, *plan.held):
-            readers[topic].append(node)
-    if TORQUE_COMMAND in readers:
+            if not (inside(schedule, node, nodes) and senders.get(topic) == PLANT):
+                readers[topic].append(node)
+    if TORQUE_COMMAND in readers and not inside(schedule, FORCE_CONTROLLER, nodes):
         readers[TORQUE_COMMAND].append(PLANT)
     found = {
         topic: Edges(
@@ -66,6 +67,17 @@ def graph_of(schedule: Schedule, nodes: Sequence[str]) -> dict[str, Edges]:
     reporting = tuple(node for node in (PLANT, PLAYER, *schedule.nodes) if node in present)
     found[DIAGNOSTICS.name] = Edges(reporting, tuple({RECORDER} & present))
     return found
+
+
+def inside(schedule: Schedule, node: str, nodes: Collection[str]) -> bool:
+    """Return whether a node is part of the plant in a run with these `nodes`."""
+    return node in schedule.hosted and {PLANT, node} <= set(nodes)
+
+
+def members_of(schedule: Schedule, *, external: bool = False) -> tuple[str, ...]:
+    """Return the nodes of a run; where drivers are `external` they are the plant and its parts."""
+    left_out = (PLANT, *schedule.hosted) if external else ()
+    return tuple(name for name in (PLANT, *schedule.nodes, RECORDER) if name not in left_out)
 
 
 def window_of(node: str) -> int:

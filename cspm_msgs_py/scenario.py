@@ -14,7 +14,9 @@ from pydantic import (
     NonNegativeInt,
     PositiveFloat,
     PositiveInt,
+    SerializerFunctionWrapHandler,
     Tag,
+    model_serializer,
     model_validator,
 )
 from typing_extensions import Self
@@ -26,6 +28,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.scenario_keys.bodies import ORIGIN, Body, Pose, Target
 from cspm_msgs_py.scenario_keys.curves import Sine
+from cspm_msgs_py.scenario_keys.drive import TORQUE_DRIVE, Drive, check_drive
 from cspm_msgs_py.scenario_keys.events import CableCut, check_times
 from cspm_msgs_py.scenario_keys.faults import Fault
 from cspm_msgs_py.scenario_keys.operation import Operation, check_operation
@@ -308,6 +311,7 @@ class Scenario(StrictModel):
     target: Target = Target()
     bar_offset: Pose = ORIGIN
     control: Control = ClosedLoop()
+    drive: Drive = TORQUE_DRIVE
     controllers: OwnControllers = {}
     safety: Safety = Safety()
     events: tuple[CableCut, ...] = ()
@@ -329,6 +333,7 @@ class Scenario(StrictModel):
 
     @model_validator(mode="after")
     def _plans_with_what_is_known(self) -> Self:
+        check_drive(self.drive, self.control.mode)
         motion = self.control.motion if isinstance(self.control, ClosedLoop) else None
         if self.target.is_measured and getattr(motion, "governor", None) is not None:
             raise ValueError(
@@ -336,6 +341,11 @@ class Scenario(StrictModel):
                 " target's motion to come, allowed: prescribed, or no governor"
             )
         return self
+
+    @model_serializer(mode="wrap")
+    def _written(self, write: SerializerFunctionWrapHandler) -> dict[str, object]:
+        """Leave the usual drive out, so that recordings of before it stay the same."""
+        return {k: v for k, v in write(self).items() if k != "drive" or v != TORQUE_DRIVE}
 
     @property
     def bar_mean_pose(self) -> Pose:

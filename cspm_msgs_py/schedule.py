@@ -21,6 +21,7 @@ from cspm_msgs_py.scenario import (
     TorqueProfile,
 )
 from cspm_msgs_py.scenario_keys.bodies import EXTERNAL, PRESCRIBED
+from cspm_msgs_py.scenario_keys.drive import TENSION_DRIVE
 from cspm_msgs_py.testbed import Testbed
 
 DIAGNOSTICS_RATE = 10
@@ -110,6 +111,7 @@ class Schedule:
         nodes: plans of all nodes but the plant, in the order in which they compute.
         plant_status_divider: steps from one of the plant's diagnostics messages to the next.
         foreign: topics that somebody else's driver sends, in this simulation too.
+        hosted: nodes that are part of the plant: what they and it hand each other is no message.
     """
 
     period_ns: int
@@ -117,6 +119,7 @@ class Schedule:
     nodes: Mapping[str, NodePlan]
     plant_status_divider: int
     foreign: tuple[str, ...] = ()
+    hosted: tuple[str, ...] = ()
 
     def idle_through(self, node: str) -> int:
         """Return the last step through which nothing comes to a node, nor has it to compute."""
@@ -207,7 +210,8 @@ def schedule_of(scenario: Scenario, testbed: Testbed) -> Schedule:
         add(FORCE_CONTROLLER, rates.force_controller, _servo_inputs(testbed), (TORQUE_COMMAND,))
     ordered = {name: timings[name] for name in names if name in timings}
     foreign = (TARGET_POSE,) if source == EXTERNAL else ()
-    return Schedule(period_ns, ordered, nodes, status_divider(rates.plant, 1), foreign)
+    hosted = (FORCE_CONTROLLER,) if scenario.drive == TENSION_DRIVE else ()
+    return Schedule(period_ns, ordered, nodes, status_divider(rates.plant, 1), foreign, hosted)
 
 
 def _topics_of(source: str, testbed: Testbed) -> list[str]:

@@ -32,8 +32,12 @@ class LockstepPlant:
         steps: int,
         followers: Iterable[str],
         publish_status: Callable[[int, Status], None],
+        observed: Callable[[], None] = lambda: None,
     ) -> None:
-        """Take the plant, how many steps to make, and whose progress to wait for."""
+        """Take the plant, how many steps to make, and whose progress to wait for.
+
+        `observed` is called once all that belongs to a state was published.
+        """
         self._simulator = simulator
         self._schedule = schedule
         self._steps = steps
@@ -47,7 +51,8 @@ class LockstepPlant:
         self._furthest = self._allowed()
         # Where a topic's next message is not due yet, nothing is left to come until then.
         self._most_ahead = max(each.first + each.divider for each in schedule.topics.values())
-        self._stopping = False
+        self._stopping = self._pumping = False
+        self._observed = observed
         self.failure: str | None = None
         self.last_step = -1
 
@@ -63,7 +68,9 @@ class LockstepPlant:
 
     def start(self) -> None:
         """Publish the first state."""
+        self._pumping = True
         self._observe()
+        self._pumping = False
         self.pump()
 
     def stop(self) -> None:
@@ -101,6 +108,16 @@ class LockstepPlant:
 
     def pump(self) -> None:
         """Advance as far as commands and acknowledgements allow."""
+        if self._pumping:
+            # A command of the drives' own came while a state was observed.
+            return
+        self._pumping = True
+        try:
+            self._pump()
+        finally:
+            self._pumping = False
+
+    def _pump(self) -> None:
         while not self._stopping and self.last_step >= 0 and self._may_advance():
             self._simulator.torque = self._early.pop(self.last_step, self._simulator.torque)
             try:
@@ -148,3 +165,4 @@ class LockstepPlant:
         simulator.observe()
         if self.last_step % self._schedule.plant_status_divider == 0:
             self._publish_status(simulator.now_ns, simulator.status())
+        self._observed()

@@ -42,14 +42,19 @@ class PlantNode:
             {
                 name: self._outbox.publisher(topics[name], edge.readers)
                 for name, edge in run.published.items()
-            }
+            },
+            lambda: 0,
         )
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
         waited_for = followers(schedule, run.nodes, WINDOW)
         self._node, self._simulator, self._period_ns = node, simulator, schedule.period_ns
-        self._plant = LockstepPlant(simulator, schedule, run.steps, waited_for, status)
+        link = run.link
+        observed = (lambda: None) if link is None else link.run
+        self._plant = LockstepPlant(simulator, schedule, run.steps, waited_for, status, observed)
         self._others = PlantSide(node, schedule.period_ns, run.others, self._progress)
-        if TORQUE_COMMAND in schedule.topics:
+        if link is not None:
+            link.command = lambda _, stamp_ns, row: self._torque(stamp_ns, row, None)
+        elif TORQUE_COMMAND in schedule.topics:
             refuse = partial(self._refuse, TORQUE_COMMAND)
             node.subscribe_numbered_rows(topics[TORQUE_COMMAND], self._torque, refuse)
         node.node.create_subscription(

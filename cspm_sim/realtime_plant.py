@@ -12,6 +12,7 @@ from cspm_msgs_py.errors import DivergenceError, InputError
 from cspm_msgs_py.schedule import TORQUE_COMMAND, Schedule
 from cspm_msgs_py.stepping.admission import Admission
 from cspm_msgs_py.stepping.delay_histogram import DelayHistogram
+from cspm_msgs_py.stepping.drive_link import DriveLink
 from cspm_msgs_py.stepping.lateness import too_busy
 from cspm_msgs_py.stepping.publisher_binding import PublisherBinding
 from cspm_sim.simulator import Simulator
@@ -48,6 +49,7 @@ class RealtimePlant:
         binding: PublisherBinding | None = None,
         lateness_ns: int | None = None,
         on_fault: Callable[[str], None] = lambda _: None,
+        link: DriveLink | None = None,
     ) -> None:
         """Take the plant, how many steps to make, and what looks after its drives.
 
@@ -60,6 +62,7 @@ class RealtimePlant:
             binding: whose torque commands count; None: anybody's.
             lateness_ns: how old the state may be that a command answers [ns]; None: any age.
             on_fault: called with why the drives went to their safe state by a message.
+            link: to the controller inside the drives; None: torques come as messages.
         """
         self._simulator = simulator
         self._schedule = schedule
@@ -70,6 +73,7 @@ class RealtimePlant:
         self._lateness_ns, self._on_fault = lateness_ns, on_fault
         self._torque_timing = schedule.topics.get(TORQUE_COMMAND)
         self._start_ns: int | None = None
+        self._link = link
         self._step = -1
         self._commanded = self._safe = False
         self.failure: str | None = None
@@ -90,6 +94,15 @@ class RealtimePlant:
     def start(self, start_ns: int) -> None:
         """Begin at an instant [ns] on the ROS clock."""
         self._start_ns = start_ns
+
+    def now_ns(self, wall_ns: int) -> int:
+        """Return the time that the drives live in [ns]: the plant's where they are part of it.
+
+        A plant that is late makes up for it, and its drives with it.
+        """
+        if self._link is None or self._start_ns is None or self._step < 0:
+            return wall_ns
+        return self._start_ns + self._step * self._schedule.period_ns
 
     def receive_torque(
         self, stamp_ns: int, torque: Array, now_ns: int, gid: bytes | None = None
@@ -149,7 +162,7 @@ class RealtimePlant:
         if timing is not None and timing.latest(self._step) == self._step:
             self.missed += not self._commanded
             self._commanded = False
-        safe = self._watchdog.torque(now_ns)
+        safe = self._watchdog.torque(self.now_ns(now_ns))
         if safe is not None:
             simulator.torque = safe
             if not self._safe:
@@ -180,3 +193,5 @@ class RealtimePlant:
                 level, message = Level.WARN, "torque commands came too late"
             self._publish_status(now_ns, Status(level, name, message, values))
             self._publish_status(now_ns, self._watchdog.status())
+        if self._link is not None:
+            self._link.run()

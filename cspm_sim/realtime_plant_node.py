@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.graph import Edges
 from cspm_msgs_py.ros.bound_flag import BoundFlag
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.fault_line import FaultLine
 from cspm_msgs_py.ros.graph_publishers import bind, census_of
 from cspm_msgs_py.ros.leader import Leader
-from cspm_msgs_py.schedule import CLOCK, FORCE_CONTROLLER, PLANT, TORQUE_COMMAND
+from cspm_msgs_py.schedule import CLOCK, FORCE_CONTROLLER, PLANT, TORQUE_COMMAND, Schedule
+from cspm_msgs_py.stepping.drive_link import DriveLink
 from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, Topic
 from cspm_sim.plant_run import PlantRun
 from cspm_sim.realtime_plant import RealtimePlant
@@ -49,10 +51,13 @@ class RealtimePlantNode:
                 name: self._on_wall_clock(node, topics[name], edge)
                 for name, edge in run.published.items()
                 if name != CLOCK
-            }
+            },
+            lambda: self._start_ns,
         )
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
-        self._binding = bind(node, topics[TORQUE_COMMAND], edges)
+        link = run.link
+        # What the drives command themselves is nobody else's.
+        self._binding = None if link else bind(node, topics[TORQUE_COMMAND], edges)
         self._plant = RealtimePlant(
             self._simulator,
             schedule,
@@ -62,6 +67,7 @@ class RealtimePlantNode:
             binding=self._binding,
             lateness_ns=lateness_ns,
             on_fault=self._line.report,
+            link=link,
         )
         self.leader = Leader(
             node,
@@ -72,14 +78,34 @@ class RealtimePlantNode:
             missing=census_of(node, run.sent, edges),
             on_start=self._start,
         )
+        if link is not None:
+            self._join(link)
+        else:
+            self._subscribe(topics, schedule)
+        node.node.create_service(ros_class("std_srvs/srv/Trigger"), RESET, self._reset)
+        # Twice as often as steps are due: a timer that is late skips calls.
+        node.every(0.5e-9 * schedule.period_ns, self._tick)
+
+    def _join(self, link: DriveLink) -> None:
+        """Take torques and brakes from the controller inside the drives."""
+
+        def command(topic: str, stamp_ns: int, row: Array) -> None:
+            try:
+                self._torque(stamp_ns, row, None)
+            except InputError as err:
+                self._refuse(topic, str(err))
+
+        link.command, link.brake = command, self._plant.receive_brake
+        link.now_ns = lambda: self._plant.now_ns(self._node.now_ns())
+
+    def _subscribe(self, topics: Mapping[str, Topic], schedule: Schedule) -> None:
+        """Hear torques and brakes from the force controller."""
+        node = self._node
         if TORQUE_COMMAND in schedule.topics:
             refuse = partial(self._refuse, TORQUE_COMMAND)
             node.subscribe_tagged_rows(topics[TORQUE_COMMAND], self._torque, refuse)
         if FORCE_CONTROLLER in schedule.nodes:
             BoundFlag(node, BRAKE, FORCE_CONTROLLER, self._plant.receive_brake, self._refuse)
-        node.node.create_service(ros_class("std_srvs/srv/Trigger"), RESET, self._reset)
-        # Twice as often as steps are due: a timer that is late skips calls.
-        node.every(0.5e-9 * schedule.period_ns, self._tick)
 
     @property
     def ended(self) -> bool:
@@ -122,10 +148,12 @@ class RealtimePlantNode:
             self.leader.end()
 
     def _torque(self, stamp_ns: int, row: Array, gid: bytes | None) -> None:
-        self._plant.receive_torque(stamp_ns, row, self._node.now_ns(), gid)
+        now_ns = self._plant.now_ns(self._node.now_ns())
+        self._plant.receive_torque(stamp_ns, row, now_ns, gid)
 
     def _refuse(self, topic: str, reason: str) -> None:
-        if self.leader.start_ns is None and self._binding.bound is None:
+        unbound = self._binding is not None and self._binding.bound is None
+        if self.leader.start_ns is None and unbound:
             return
         self._plant.refuse(self._node.now_ns(), reason)
         self._node.complain(topic, reason)

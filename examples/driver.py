@@ -50,11 +50,14 @@ class Driver(Node):
         self.hardware, self.commanded = Hardware(), float("inf")  # when the last command came
         self.braked = self.tripped = False
         self.held: tuple[list[float], list[float]] | None = None  # torques and angles at the trip
+        tension = self.declare_parameter("drive", "torque").value == "tension"  # the scenario's
+        self.scales = RADII if tension else [1.0] * len(RADII)  # from commands to torques
         self.watchdog = self.declare_parameter("watchdog", 0.04).value  # s; the loop's delay margin
         self.winches = self.create_publisher(JointState, "/winches/state", 10)
         self.cells = self.create_publisher(JointState, "/cables/tension", 10)
         self.poses = {name: self.create_publisher(PoseStamped, name, 10) for name in POSES}
-        self.create_subscription(JointState, "/winches/torque_command", self._command, 10)
+        command = "/tension_command" if tension else "/winches/torque_command"
+        self.create_subscription(JointState, command, self._command, 10)
         self.create_subscription(Bool, "/winches/brake", self._brake, 10)
         self.create_timer(1.0 / self.declare_parameter("rate", 200.0).value, self._measure)
 
@@ -84,9 +87,11 @@ class Driver(Node):
         self.hardware.write(limited, self.braked)
 
     def _command(self, message: JointState) -> None:
-        self.commanded, torques = time.monotonic(), list(message.effort)
+        self.commanded = time.monotonic()
+        torques = [scale * each for scale, each in zip(self.scales, message.effort, strict=False)]
         age = (self.get_clock().now() - rclpy.time.Time.from_msg(message.header.stamp)).nanoseconds
-        ok = age < 1e9 * self.watchdog and [*message.name, len(torques)] == [*CABLES, len(LIMITS)]
+        fits = [*message.name, len(message.effort)] == [*CABLES, len(CABLES)]
+        ok = fits and age < 1e9 * self.watchdog
         self.tripped |= not (ok and all(abs(t) <= m for t, m in zip(torques, LIMITS, strict=True)))
         if not self.tripped:
             self.hardware.write(torques, self.braked)

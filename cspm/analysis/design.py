@@ -136,7 +136,7 @@ def _closed_loop(
     # The gains are those of the design pose; how they do is checked here.
     motion = designed.motion.model_copy(update={"design_pose": machine.pose})
     control = designed.model_copy(update={"motion": motion})
-    late = period_of_force(scenario.rates) if computing is None else computing
+    late = period_of_force(scenario) if computing is None else computing
     return control, timing_of(scenario, machine.testbed, late)
 
 

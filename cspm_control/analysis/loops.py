@@ -83,7 +83,7 @@ def analyse_loops(testbed: Testbed, control: ClosedLoop, timing: LoopTiming) -> 
     law = pid_law(control)
     axes = controlled_axes(control)
     motion = _designed_motion(testbed, law, axes)
-    motion[SAMPLED] = _sampled_motion(testbed, law, prompt, axes)
+    motion[SAMPLED] = sampled_motion(testbed, law, prompt, axes)
     growth = {}
     for way, clock in cascades.items():
         motion[way], growth[way] = _cascaded_motion(testbed, control, clock)
@@ -134,9 +134,10 @@ def _designed_force(testbed: Testbed, control: ClosedLoop) -> dict[str, dict[str
     return {DESIGNED: found}
 
 
-def _sampled_motion(
+def sampled_motion(
     testbed: Testbed, motion: MotionControl, timing: LoopTiming, axes: Sequence[int]
 ) -> dict[str, LoopView]:
+    """Return the sampled motion loop of each controlled DOF alone, by name."""
     continuous = motion_plant(testbed, nominal_parameters(testbed), motion.design_pose, axes)
     plant = motion_plant_sampled(continuous, timing)
     found = {}

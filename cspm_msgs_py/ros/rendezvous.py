@@ -24,6 +24,8 @@ _HEADER = "std_msgs/msg/Header"
 _NANOSECONDS = 1_000_000_000
 _LOOK_EVERY_S = 0.05
 _READY, _APART, _PROVING = -1, -2, -3
+# Proofs are asked for so often [s]: each node of a process takes one such message in its turn.
+_ASK_EVERY_S, _ASKED_S = 0.5, 1.5
 # How long it may take on one machine until all who are there are seen.
 SETTLE_S = 0.5
 
@@ -65,7 +67,7 @@ class FollowerSide:
         self._on_start = on_start
         node.node.create_subscription(self._header, local(START), self._start, contract_qos(None))
         node.node.create_subscription(self._header, local(END), self._end, contract_qos(None))
-        self._connected, self._asked = False, -SETTLE_S
+        self._connected, self._asked = False, -_ASKED_S
         self._timer = node.every(_LOOK_EVERY_S, self._announce)
         self.end_ns: int | None = None
 
@@ -93,8 +95,8 @@ class FollowerSide:
         self._publisher.publish(message)
 
     def asked(self) -> bool:
-        """Return whether the leader has asked for proofs within the last half second."""
-        return time.monotonic() - self._asked < SETTLE_S
+        """Return whether the leader asks for proofs."""
+        return time.monotonic() - self._asked < _ASKED_S
 
     def _end(self, message: object) -> None:
         end_ns = _stamp_of(message)
@@ -142,6 +144,7 @@ class PlantSide:
         self.absent = set(others)
         self.apart: set[str] = set()
         self.proving: set[str] = set()
+        self._asked = -_ASK_EVERY_S
 
     def unmatched(self) -> list[str]:
         """Return what is still missing before the run can start.
@@ -190,7 +193,10 @@ class PlantSide:
 
     def ask_for_proofs(self) -> None:
         """Have those that are to prove somebody's drivers do so: all else is there."""
-        self._starter.publish(self._stamped(_PROVING * _NANOSECONDS))
+        now = time.monotonic()
+        if now - self._asked >= _ASK_EVERY_S:
+            self._asked = now
+            self._starter.publish(self._stamped(_PROVING * _NANOSECONDS))
 
     def _stamped(self, stamp_ns: int) -> object:
         message = self._header(frame_id=self._node.name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 
 import numpy as np
@@ -14,12 +14,24 @@ from cspm_msgs_py.ros.guard_ports import GuardPorts
 from cspm_msgs_py.ros.outbox import Outbox
 from cspm_msgs_py.ros.own_senders import OwnSenders
 from cspm_msgs_py.ros.rendezvous import FollowerSide
-from cspm_msgs_py.schedule import Schedule
+from cspm_msgs_py.schedule import PLANT, TORQUE_COMMAND, Schedule
+from cspm_msgs_py.stepping.drive_link import DriveLink
 from cspm_msgs_py.stepping.lockstep import Acknowledgement, Follower
 from cspm_msgs_py.stepping.stage import Guard, Stage
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
 
 Array = NDArray[np.float64]
+Publish = Callable[[int, int, Array], None]
+
+
+def commanding(publish: Publish, link: DriveLink) -> Publish:
+    """Return what publishes torque commands, and keeps them for the plant."""
+
+    def send(log_ns: int, stamp_ns: int, row: Array) -> None:
+        link.order(TORQUE_COMMAND, stamp_ns, row)
+        publish(log_ns, stamp_ns, row)
+
+    return send
 
 
 class StageNode:
@@ -40,6 +52,7 @@ class StageNode:
         tells_progress: bool,
         guard: Guard | None = None,
         own: Collection[str] = (),
+        link: DriveLink | None = None,
     ) -> None:
         """Connect the stage.
 
@@ -53,18 +66,25 @@ class StageNode:
             guard: the stage itself where it has a safe state.
             own: nodes that are programs of the user's, whose topics have to be there before it is
                 ready.
+            link: to the plant that the stage is part of; None: it is a node of its own.
         """
         plan = schedule.nodes[stage.node]
         self._node = node
         self._acknowledgement = Acknowledgement() if tells_progress else None
         self._outbox = outbox = Outbox(node)
         publish = {n: outbox.publisher(topics[n], edges[n].readers) for n in plan.outputs}
+        receive = self._receive_and_tell if tells_progress else self._receive
+        if link is not None:
+            publish[TORQUE_COMMAND] = commanding(publish[TORQUE_COMMAND], link)
+            link.receive = lambda topic, stamp_ns, row: receive(topic, stamp_ns, row, None)
         status = node.status_publisher(edges[DIAGNOSTICS.name].readers)
         self._follower = Follower(stage, schedule, publish, status)
         senders = OwnSenders(node, schedule, own, (*plan.inputs, *plan.held))
+        self._link = link
         self._plant = FollowerSide(node, schedule.period_ns, self._end, ready=senders.ready)
-        receive = self._receive_and_tell if tells_progress else self._receive
         for name in (*plan.inputs, *plan.held):
+            if link is not None and edges[name].senders == (PLANT,):
+                continue
             refuse = partial(self._refuse, name)
             node.subscribe_numbered_rows(topics[name], partial(receive, name), refuse)
         if guard is not None:
@@ -97,6 +117,8 @@ class StageNode:
     def _receive(self, topic: str, stamp_ns: int, row: Array, number: int | None) -> None:
         self._follower.receive(topic, stamp_ns, row, number)
         self._outbox.send_rest()
+        if self._link is not None:
+            self._link.run()
 
     def _receive_and_tell(self, topic: str, stamp_ns: int, row: Array, number: int | None) -> None:
         self._receive(topic, stamp_ns, row, number)

@@ -24,8 +24,8 @@ class Proof(Protocol):
     def restart(self) -> None:
         """Take note that a driver is missing."""
 
-    def torque(self, now_ns: int) -> tuple[int, Array] | None:
-        """Return the stamp [ns] of the state answered and torques (n,) [N·m], None for none now.
+    def command(self, now_ns: int) -> tuple[int, Array] | None:
+        """Return the stamp [ns] of the state answered and what drives are to obey, or None.
 
         Raises:
             InputError: the drivers are wrong, in one line.

@@ -16,7 +16,7 @@ from cspm_ros.check_drivers.driver_observation import Finding, Observation, hear
 # Each topic is heard for so long: 20 messages of the slowest usual motion capture, at 20 Hz [ns].
 LISTEN_NS = 1_000_000_000
 # A rate that is so far from the scenario's is another rate, and no busy computer's [share].
-WRONG_RATE, _RATE_MARGIN = "wrong_rate", 0.2
+WRONG_RATE, _RATE_MARGIN = "wrong_rate", 0.4
 # Checks that need no motion; delays change with what else the computer does.
 STATIC = ("units", "quaternion", "axes", "balance", "holding", "finite", "clock", WRONG_RATE)
 # One odd message says nothing of a driver, all of them do.

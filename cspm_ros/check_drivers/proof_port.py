@@ -43,14 +43,14 @@ class ProofPort:
         self._intake.take()
         self._proof.restart()
 
-    def torque(self, now_ns: int) -> tuple[int, Array] | None:
-        """Return the stamp [ns] of the state answered and torques (n,) [N·m], None for none now.
+    def command(self, now_ns: int) -> tuple[int, Array] | None:
+        """Return the stamp [ns] of the state answered and what drives are to obey, or None.
 
         Raises:
             InputError: the drivers are wrong, in one line.
         """
         self._intake.take()
-        return self._proof.torque(now_ns)
+        return self._proof.command(now_ns)
 
     def close(self) -> None:
         """Leave the topics."""

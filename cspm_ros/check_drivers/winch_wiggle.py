@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 TRAVEL = 0.001  # m of cable, each way
 FARTHEST = 0.008  # m that any winch may turn by
 RAMP_S, SETTLE_S, MEASURE_S = 0.8, 0.1, 0.1
+FEWEST_ROWS = 3  # of each topic on a plateau
 SLOW = 0.005  # m/s, beyond which no more force is given
 LONGEST_STEP_S = 0.02
 # Shares of what is left to the upper tension limit, and of the tension that there is.
@@ -49,8 +50,15 @@ class WinchWiggle:
         done: whether all winches were wiggled.
     """
 
-    def __init__(self, testbed: Testbed, tensions: Array) -> None:
-        """Take the machine, and the tensions (n,) [N] that its drives hold now."""
+    def __init__(self, testbed: Testbed, tensions: Array, slowest_hz: float) -> None:
+        """Take what is wiggled.
+
+        Args:
+            testbed: the machine.
+            tensions: what its drives hold now, (n,) [N].
+            slowest_hz: the rate of its slowest sensor [Hz].
+        """
+        self._measure_s = max(MEASURE_S, (FEWEST_ROWS + 1) / slowest_hz)
         cables = testbed.cables
         self._names = testbed.cable_names
         self._hold = Hold(testbed, tensions, 0.0)
@@ -62,7 +70,7 @@ class WinchWiggle:
         self._bounds = np.maximum(LEAST_FORCE, [more, less])
         self._before: Array | None = None
         self._last_ns, self._arrived_ns = 0, -1
-        self._winch, self._way, self._force = 0, 0, 0.0
+        self._winch, self._way, self._force, self._measured = 0, 0, 0.0, 0
         self.measuring: Plateau | None = None
 
     @property
@@ -105,8 +113,9 @@ class WinchWiggle:
             return
         held = (now_ns - self._arrived_ns) * 1e-9
         self.measuring = Plateau(self._winch, way) if held >= SETTLE_S else None
-        if held >= SETTLE_S + MEASURE_S:
-            self.measuring, self._arrived_ns = None, -1
+        self._measured += self.measuring is not None
+        if held >= SETTLE_S + self._measure_s and self._measured > FEWEST_ROWS:
+            self.measuring, self._arrived_ns, self._measured = None, -1, 0
             self._way += 1
 
     def _go_back(self, passed: float) -> None:

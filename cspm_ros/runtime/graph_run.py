@@ -52,8 +52,9 @@ def run_graph(
     steps = steps or round(scenario.duration * scenario.rates.plant)
     with ExitStack() as stack:
         session = stack.enter_context(Session(domain_id=domain_id, polled=True))
-        plant = run.plant(session.node(PLANT), steps)
-        others = [run.stage(session.node(name)) for name in schedule.nodes]
+        link = run.link()
+        plant = run.plant(session.node(PLANT), steps, link)
+        others = [run.stage(session.node(name), link) for name in schedule.nodes]
         writer = stack.enter_context(new_recording(bundle, folder, GRAPH))
         recorder = run.recorder(session.node(RECORDER), writer)
         stack.callback(recorder.close)

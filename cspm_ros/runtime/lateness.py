@@ -1,4 +1,4 @@
-"""How old the state may be that a torque command answers, by the scenario's loops."""
+"""How old the state may be that a command to the drives answers, by the scenario's loops."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cspm_run.bundle import Bundle
 
 
 def lateness_ns(bundle: Bundle) -> int | None:
-    """Return the largest age [ns]: `safety.lateness`, else what the force loops' margin allows.
+    """Return the largest age [ns]: `safety.lateness`, else what the loops' margin allows.
 
     None where nothing says: no closed loop, a force controller of the user's own, or rates that
     `cspm analyze design` cannot follow.

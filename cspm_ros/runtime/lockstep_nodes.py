@@ -8,6 +8,7 @@ from cspm_msgs_py.graph import PLAYER, followers
 from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.stage_node import StageNode
+from cspm_msgs_py.stepping.drive_link import DriveLink
 from cspm_msgs_py.stepping.lockstep import WINDOW
 from cspm_msgs_py.topics import DIAGNOSTICS
 from cspm_ros.runtime.nodes_of_run import NodesOfRun
@@ -19,8 +20,13 @@ from cspm_sim.plant_node import PlantNode
 class LockstepRun(NodesOfRun):
     """A run in lockstep whose nodes are to be made; attributes as `NodesOfRun`."""
 
-    def plant(self, node: ContractNode, steps: int) -> PlantNode:
-        """Return the plant's node; `steps` is how many plant steps to make.
+    def plant(self, node: ContractNode, steps: int, link: DriveLink | None = None) -> PlantNode:
+        """Return the plant's node.
+
+        Args:
+            node: the ROS node.
+            steps: how many plant steps to make.
+            link: to the controller inside its drives, if it is there.
 
         Raises:
             InputError: somebody's driver is to send a topic, who cannot keep the schedule.
@@ -29,11 +35,11 @@ class LockstepRun(NodesOfRun):
         self.claim(node)
         check_lockstep(self.schedule)
         with self.bundle.unpacked() as place:
-            run = self.plant_run(steps, place)
+            run = self.plant_run(steps, place, link)
         return PlantNode(node, run)
 
-    def stage(self, node: ContractNode) -> StageNode:
-        """Return the node of the controller that `node` is named after."""
+    def stage(self, node: ContractNode, link: DriveLink | None = None) -> StageNode:
+        """Return the node of the controller that `node` is named after; `link` as in `plant`."""
         self.name_machine(node)
         bundle, schedule = self.bundle, self.schedule
         with bundle.unpacked() as place:
@@ -48,6 +54,7 @@ class LockstepRun(NodesOfRun):
             tells_progress=node.name in followers(schedule, self.members, WINDOW),
             guard=stage if isinstance(stage, GuardedStage) else None,
             own=self.own,
+            link=link if node.name in self.hosted else None,
         )
 
     def recorder(self, node: ContractNode, writer: RecordingWriter) -> RecorderNode:

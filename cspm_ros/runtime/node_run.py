@@ -131,7 +131,10 @@ def _run_realtime(
     steps = parameters.steps or round(bundle.scenario.duration * bundle.scenario.rates.plant)
     path = Path(parameters.report) if parameters.report else None
     if node.name == PLANT:
-        plant = run.plant(node, steps)
+        link = run.link()
+        plant = run.plant(node, steps, link)
+        for name in run.hosted:
+            run.stage(session.node(name), link=link)
         _go_ahead(node, parameters)
         if parameters.start_on_call:
             plant.leader.wait_for_call()
@@ -178,6 +181,11 @@ def _go_ahead(node: ContractNode, parameters: NodeParameters) -> None:
 
 
 def _check_part(node: ContractNode, scenario: str, schedule: Schedule) -> None:
+    if node.name in schedule.hosted:
+        raise InputError(
+            f"node {node.name}: scenario {scenario} has it in its drives (drive: tension), allowed:"
+            f" {', '.join((PLANT, *(n for n in schedule.nodes if n != node.name), RECORDER))}"
+        )
     if node.name not in schedule.nodes:
         raise InputError(
             f"node {node.name}: scenario {scenario} has none, allowed:"
@@ -208,7 +216,11 @@ def _run_plant(
     began: float,
 ) -> None:
     scenario = run.bundle.scenario
-    plant = run.plant(node, parameters.steps or round(scenario.duration * scenario.rates.plant))
+    link = run.link()
+    steps = parameters.steps or round(scenario.duration * scenario.rates.plant)
+    plant = run.plant(node, steps, link)
+    for name in run.hosted:
+        run.stage(session.node(name), link)
     watch = _watch(plant, node, parameters, began)
     path = Path(parameters.report) if parameters.report else None
 

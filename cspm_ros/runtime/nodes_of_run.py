@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cspm_model.scene.urdf import urdf
-from cspm_msgs_py.graph import Edges, graph_of
+from cspm_msgs_py.graph import Edges, graph_of, inside
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.rendezvous import START
 from cspm_msgs_py.scenario import ClosedLoop
-from cspm_msgs_py.schedule import Schedule, schedule_of
+from cspm_msgs_py.schedule import TENSION, Schedule, schedule_of
+from cspm_msgs_py.stepping.drive_link import DriveLink
 from cspm_msgs_py.topics import Topic
 from cspm_ros.runtime.robot_description import publish_description
 from cspm_run.assembly import assemble_simulator, faults_of
@@ -64,12 +65,30 @@ class NodesOfRun:
         if node.claim(self.bundle.scenario.name, START):
             publish_description(node, urdf(self.bundle.testbed.testbed))
 
-    def plant_run(self, steps: int, place: Path, *, realtime: bool = False) -> PlantRun:
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """The controllers that take part."""
+        return tuple(name for name in self.schedule.nodes if name in self.members)
+
+    def link(self) -> DriveLink | None:
+        """Return what joins plant and force controller where that is part of it, else None."""
+        return DriveLink(TENSION) if self.hosted else None
+
+    @property
+    def hosted(self) -> tuple[str, ...]:
+        """The nodes that are made with the plant, in its process."""
+        schedule = self.schedule
+        return tuple(n for n in schedule.hosted if inside(schedule, n, self.members))
+
+    def plant_run(
+        self, steps: int, place: Path, link: DriveLink | None = None, *, realtime: bool = False
+    ) -> PlantRun:
         """Return what the plant's node is made of.
 
         Args:
             steps: how many plant steps to make.
             place: where the bundle is unpacked.
+            link: to the controller inside the drives, if it is there.
             realtime: whether the run is one in real time, into which faults may be put.
         """
         scenario, testbed = self.bundle.scenario, self.bundle.testbed.testbed
@@ -84,4 +103,5 @@ class NodesOfRun:
             controlled=isinstance(scenario.control, ClosedLoop),
             target=target,
             faults=faults_of(scenario, testbed, self.bundle.plant, realtime=realtime),
+            link=link,
         )

@@ -12,7 +12,7 @@ from typing import overload
 
 from cspm_control.safety import check_real_time
 from cspm_msgs_py.errors import CspmError, InputError
-from cspm_msgs_py.graph import RECORDER
+from cspm_msgs_py.graph import RECORDER, members_of
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.overview import overview
@@ -83,8 +83,10 @@ def run_processes(
         raise InputError("a concealed machine in processes, allowed: in one process")
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
     schedule = schedule_of(scenario, testbed)
-    names = (PLANT, *schedule.nodes, RECORDER)[external:]
-    started = tuple(name for name in names if name not in own_nodes)
+    names = members_of(schedule, external=external)
+    # What is part of the plant is made with it.
+    apart = {*own_nodes, *schedule.hosted}
+    started = tuple(name for name in names if name not in apart)
     if mode == REALTIME:
         check_real_time(scenario.safety, schedule)
     # In lockstep the recorder has 48 steps of time; by the wall clock it would lose messages.

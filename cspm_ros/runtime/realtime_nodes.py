@@ -19,16 +19,19 @@ from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.ros.contract_node import ContractNode
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.ros.realtime_node import RealtimeNode, RealtimeWaveNode
+from cspm_msgs_py.safety_spec import Safety
 from cspm_msgs_py.schedule import (
     BAR_POSE,
     BAR_REFERENCE,
     CLOCK,
     FORCE_CONTROLLER,
     PLANT,
+    TENSION_DISTRIBUTION,
     TORQUE_COMMAND,
     WAVE_TRAJECTORY,
     WINCH_STATE,
 )
+from cspm_msgs_py.stepping.drive_link import DriveLink
 from cspm_msgs_py.topics import (
     BRAKE,
     DIAGNOSTICS,
@@ -86,18 +89,27 @@ class RealtimeRun(NodesOfRun):
         used = {name for plan in schedule.nodes.values() for name in (*plan.inputs, *plan.held)}
         return [name for name in sensors if name in used]
 
-    def plant(self, node: ContractNode, steps: int) -> RealtimePlantNode:
-        """Return the plant's node; `steps` is how many plant steps to make."""
+    def plant(
+        self, node: ContractNode, steps: int, link: DriveLink | None = None
+    ) -> RealtimePlantNode:
+        """Return the plant's node.
+
+        Args:
+            node: the ROS node.
+            steps: how many plant steps to make.
+            link: to the controller inside its drives, if it is there.
+        """
         self.name_machine(node)
         self.claim(node)
         bundle = self.bundle
         check_real_time(bundle.scenario.safety, self.schedule)
         with bundle.unpacked() as place:
             warm_up(PLANT, bundle, place)
-            run = self.plant_run(steps, place, realtime=True)
+            run = self.plant_run(steps, place, link, realtime=True)
         if run.faults is not None:
             FaultPort(node.node, run.faults)
-        lateness, oldest = lateness_ns(bundle), None
+        # Drives that close the loop themselves are never late for it.
+        lateness, oldest = None if link else lateness_ns(bundle), None
         if lateness is not None:
             # Until the next command has come.
             oldest = (
@@ -107,21 +119,26 @@ class RealtimeRun(NodesOfRun):
         return RealtimePlantNode(node, run, watchdog, lateness)
 
     def stage(
-        self, node: ContractNode, goal_duration: float = GOAL_S, goal_sender: str = ""
+        self,
+        node: ContractNode,
+        goal_duration: float = GOAL_S,
+        goal_sender: str = "",
+        link: DriveLink | None = None,
     ) -> RealtimeNode | RealtimeWaveNode:
         """Return the node of the controller that `node` is named after.
 
         `goal_duration` is how long the bar takes to a goal [s], `goal_sender` the node whose goals
-        count, empty: the first to publish.
+        count, empty: the first to publish. `link` is as in `plant`.
         """
         self.name_machine(node)
         bundle, schedule = self.bundle, self.schedule
         topics, edges = self.testbed_topics, self.edges
-        safety = bundle.scenario.safety
+        safety = bundle.scenario.safety if link is None else self._safety_of_drives()
         check_real_time(safety, schedule)
+        scenario = bundle.scenario.model_copy(update={"safety": safety})
         with bundle.unpacked() as place:
             warm_up(node.name, bundle, place)
-            stage = assemble_stage(node.name, bundle.scenario, bundle.testbed.testbed, place)
+            stage = assemble_stage(node.name, scenario, bundle.testbed.testbed, place)
         if node.name == WAVE_TRAJECTORY:
             if isinstance(stage, WaveStage) and BAR_REFERENCE in stage.trajectories:
                 goals = make_goals(stage, bundle.scenario, bundle.testbed.testbed, goal_duration)
@@ -138,24 +155,38 @@ class RealtimeRun(NodesOfRun):
             edges,
             safety.stale_after,
             plausibility=self._plausibility(node.name),
-            lateness_ns=None if guard is None else lateness_ns(bundle),
+            lateness_ns=None if guard is None or link is not None else lateness_ns(bundle),
             on_start=stage.start if isinstance(stage, timed) else None,
             on_safe=stage.suspend if isinstance(stage, MotionStage | OwnStage) else None,
-            proof=self._proof(node) if self._proves and node.name == FORCE_CONTROLLER else None,
+            proof=self._proof(node) if self._proves and node.name == self._commands else None,
+            link=link,
         )
+
+    def _safety_of_drives(self) -> Safety:
+        """Return the safety of drives that take tensions: these are stale beyond the margin."""
+        safety, margin_ns = self.bundle.scenario.safety, lateness_ns(self.bundle)
+        if margin_ns is None:
+            return safety
+        return safety.model_copy(update={"stale_after": min(safety.stale_after, margin_ns * 1e-9)})
 
     @property
     def _proves(self) -> bool:
         """Whether somebody's drivers have to prove what they are by a wiggle of their winches."""
-        commanded = FORCE_CONTROLLER in self.members and WINCH_STATE in self.measured()
+        commanded = self._commands in self.members and WINCH_STATE in self.measured()
         return commanded and PLANT not in self.members
+
+    @property
+    def _commands(self) -> str:
+        """The node that commands the drives."""
+        return TENSION_DISTRIBUTION if self.schedule.hosted else FORCE_CONTROLLER
 
     def _proof(self, node: ContractNode) -> ProofPort:
         # Loads parts of SciPy, which no other run needs.
         from cspm_ros.check_drivers.driver_proof import DriverProof
 
-        testbed = self.bundle.testbed.testbed
-        return ProofPort(node, testbed, DriverProof(testbed, self.measured()))
+        testbed, scenario = self.bundle.testbed.testbed, self.bundle.scenario
+        proof = DriverProof(testbed, scenario.rates, self.measured(), scenario.drive)
+        return ProofPort(node, testbed, proof)
 
     def _plausibility(self, node: str) -> MachinePlausibility:
         """Return what a node judges its inputs by, with a following error from the machine."""

@@ -14,9 +14,9 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from cspm_msgs_py.errors import CspmError
-from cspm_msgs_py.graph import RECORDER
+from cspm_msgs_py.graph import RECORDER, members_of
 from cspm_msgs_py.ros.session import FAREWELL_S, Session
-from cspm_msgs_py.schedule import PLANT, schedule_of
+from cspm_msgs_py.schedule import schedule_of
 from cspm_ros.runtime.realtime_nodes import RealtimeRun
 from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, PATIENCE_S, Patience, StartWatch
 from cspm_run.bundle import Bundle
@@ -58,17 +58,17 @@ def run_realtime(
     """
     began = time.perf_counter()
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
-    stages = schedule_of(scenario, testbed).nodes
-    run = RealtimeRun(bundle, (PLANT, *stages, RECORDER)[external:])
+    run = RealtimeRun(bundle, members_of(schedule_of(scenario, testbed), external=external))
     steps = steps or round(scenario.duration * scenario.rates.plant)
     with ExitStack() as stack:
         session = stack.enter_context(Session(domain_id=domain_id, polled=True))
         leads = session.node(run.leader)
         # Before any other node is there, which another run's could hear.
         run.claim(leads)
-        plant = None if external else run.plant(leads, steps)
-        for name in stages:
-            run.stage(session.node(name))
+        link = run.link()
+        plant = None if external else run.plant(leads, steps, link)
+        for name in run.stages:
+            run.stage(session.node(name), link=link if name in run.hosted else None)
         writer = stack.enter_context(run.new_recording(folder, REALTIME))
         recorder, leading = run.recorder(
             leads if external else session.node(RECORDER), writer, steps, patience_s

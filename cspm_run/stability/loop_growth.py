@@ -9,7 +9,8 @@ from typing import NamedTuple
 from cspm_control.analysis.loops import cascade_growth
 from cspm_control.analysis.sampled_loops import LoopTiming, timing_of
 from cspm_msgs_py.errors import CspmError
-from cspm_msgs_py.scenario import ClosedLoop, MotionControl, Rates, Scenario
+from cspm_msgs_py.scenario import ClosedLoop, MotionControl, Scenario
+from cspm_msgs_py.scenario_keys.drive import TENSION_DRIVE
 from cspm_msgs_py.schedule import FORCE_CONTROLLER, MOTION_CONTROLLER, TENSION_DISTRIBUTION
 from cspm_msgs_py.testbed import Testbed
 
@@ -47,9 +48,12 @@ class _Question:
     testbed: Testbed = field(compare=False)
 
 
-def period_of_force(rates: Rates) -> float:
-    """Return the period of the force controllers [s], by which torques are late in real time."""
-    return 1.0 / rates.force_controller
+def period_of_force(scenario: Scenario) -> float:
+    """Return the period of the force controllers [s], by which torques are late in real time.
+
+    Those of drives that close the loop themselves are not late.
+    """
+    return 0.0 if scenario.drive == TENSION_DRIVE else 1.0 / scenario.rates.force_controller
 
 
 def loop_growth(scenario: Scenario, testbed: Testbed, computing: float = 0.0) -> Growth | None:

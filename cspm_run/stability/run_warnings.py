@@ -34,7 +34,7 @@ def run_warnings(
 
 def unstable_line(scenario: Scenario, testbed: Testbed, *, late: bool = False) -> str | None:
     """Return a line where the loops are not stable about rest; arguments as `run_warnings`."""
-    computing = period_of_force(scenario.rates) if late else 0.0
+    computing = period_of_force(scenario) if late else 0.0
     found = loop_growth(scenario, testbed, computing)
     if found is None or not found.unstable:
         return None

@@ -4,7 +4,7 @@ import pytest
 from run_samples import bundle_of
 from schedules import delayed
 
-from cspm_msgs_py.graph import NODES, PLAYER, RECORDER, STAGES, followers, graph_of
+from cspm_msgs_py.graph import NODES, PLAYER, RECORDER, STAGES, followers, graph_of, members_of
 from cspm_msgs_py.schedule import PLANT, schedule_of
 from cspm_msgs_py.stepping.lockstep import WINDOW
 
@@ -48,6 +48,21 @@ def test_the_edges_of_a_closed_loop():
             assert edge.senders == (sender,)
         assert set(edge.readers) == {*readers, RECORDER}
         assert len(edge.readers) == len(set(edge.readers))
+
+
+def test_drives_that_take_tensions_hear_no_tension_and_send_no_torque_to_the_plant():
+    found = schedule("rest", "drive=tension")
+    edges = graph_of(found, everybody(found))
+    assert edges["/tension_command"].readers == ("force_controller", RECORDER)
+    for name in ("/cables/tension", "/winches/state", "/winches/torque_command"):
+        assert edges[name].readers == (RECORDER,)
+    # Where a player is in the plant's place they are nodes of their own.
+    played = graph_of(found, (PLAYER, "force_controller", RECORDER))
+    assert "force_controller" in played["/cables/tension"].readers
+    assert members_of(found) == everybody(found)
+    drivers = members_of(found, external=True)
+    assert drivers == tuple(n for n in everybody(found) if n not in (PLANT, "force_controller"))
+    assert members_of(schedule(), external=True) == everybody(schedule())[1:]
 
 
 def test_control_never_reads_the_truth():

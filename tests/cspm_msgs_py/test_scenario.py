@@ -309,3 +309,16 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(InputError) as caught:
         load_scenario(tmp_path / "none.yaml")
     assert str(caught.value) == f"{tmp_path / 'none.yaml'}: no such file, allowed: a YAML file"
+
+
+def test_drives_take_torques_unless_a_closed_loop_says_otherwise():
+    text = "name: a\ntestbed: t.yaml\nduration: 1.0\n"
+    usual = parse_scenario(text, "a")
+    assert usual.drive == "torque"
+    # Recordings of before stay the same.
+    assert "drive" not in usual.model_dump()
+    wanted = parse_scenario(text + "drive: tension\n", "a")
+    assert wanted.model_dump()["drive"] == "tension"
+    locked = text + "drive: tension\ncontrol: {mode: locked_winches}\n"
+    with pytest.raises(InputError, match=r"drive: tension with control\.mode locked_winches"):
+        parse_scenario(locked, "a")

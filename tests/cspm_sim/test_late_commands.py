@@ -254,3 +254,11 @@ def test_the_margin_is_that_of_the_design():
     assert lateness_ns(rest) == round(least * 1e9)
     assert lateness_ns(bundle_of("rest", "safety.lateness=0.2")) == 200 * MS
     assert lateness_ns(bundle_of("one_winch")) is None
+
+
+def test_drives_that_take_tensions_leave_the_margin_of_the_motion_loops():
+    """Some tens of milliseconds, where torques have one."""
+    drives = bundle_of("rest", "drive=tension")
+    least = largest_age(drives.scenario, drives.testbed.testbed)
+    assert 0.04 < least < 0.06
+    assert lateness_ns(drives) == round(least * 1e9)

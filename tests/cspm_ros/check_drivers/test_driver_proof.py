@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.message import message_of
 from cspm_msgs_py.ros_types import serialize
+from cspm_msgs_py.scenario_keys.drive import TORQUE_DRIVE
 from cspm_msgs_py.schedule import BAR_POSE, FRAME_POSE, TENSION, TORQUE_COMMAND, WINCH_STATE
-from cspm_ros.check_drivers.driver_proof import DriverProof
+from cspm_ros.check_drivers.driver_proof import SILENT_NS, DriverProof
 from cspm_ros.check_drivers.winch_wiggle import FARTHEST
 from cspm_run.assembly import assemble
 from cspm_sim.simulator import Simulator
@@ -85,14 +86,15 @@ def proved(bundle, **changes):
     """Put drivers to the proof; return it and their lab, and the refusal, None if they passed."""
     names = {"torque": TORQUE_COMMAND, "winches": WINCH_STATE, "cells": TENSION, "bar": BAR_POSE}
     lab = Lab(bundle, {names[key]: change for key, change in changes.items()})
-    proof, now = DriverProof(lab.testbed, MEASURED), START_NS
+    rates = bundle.scenario.rates.model_copy(update={"motion_capture": RATE})
+    proof, now = DriverProof(lab.testbed, rates, MEASURED, TORQUE_DRIVE), START_NS
     lab.observe()
     try:
         while not proof.passed:
             for name in MEASURED:
                 payload = serialize(message_of(lab.testbed.topics[name], now, lab.measured(name)))
                 proof.hear(name, payload)
-            command = proof.torque(now)
+            command = proof.command(now)
             lab.go_on(None if command is None else command[1])
             now += 1_000_000_000 // RATE
     except InputError as err:
@@ -106,6 +108,23 @@ def test_good_drivers_pass_and_nothing_goes_far(bundle):
     assert lab.farthest < FARTHEST
     assert lab.tautest < 8.0
     assert np.abs(lab.plant.bar_state[:3] - [0.0, 0.0, 2.0]).max() < 0.02
+
+
+def test_drives_that_fall_silent_in_the_wiggle_are_refused(bundle):
+    lab = Lab(bundle, {})
+    proof = DriverProof(lab.testbed, bundle.scenario.rates, MEASURED, TORQUE_DRIVE)
+    lab.observe()
+    now, period = START_NS, 1_000_000_000 // RATE
+    while not proof.under_way:
+        for name in MEASURED:
+            payload = serialize(message_of(lab.testbed.topics[name], now, lab.measured(name)))
+            proof.hear(name, payload)
+        proof.command(now)
+        now += period
+    assert proof.command(now) is None
+    assert proof.command(now + SILENT_NS - 2 * period) is None
+    with pytest.raises(InputError, match=r"nothing new of /cables/tension and /winches/state for"):
+        proof.command(now + SILENT_NS + period)
 
 
 @pytest.mark.parametrize(

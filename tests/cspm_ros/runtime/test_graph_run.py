@@ -60,6 +60,7 @@ RUNS = {
     ),
     "a measured target": (bundle_of("calm_measured_target", "rates.motion_capture=100"), 250),
     "a cut cable": (bundle_of("calm_cut_cable", "events=[{at: 0.1, cut: hoist_1}]"), 250),
+    "tension drives": (bundle_of("rest", "drive=tension"), 200),
     "odd rates": (bundle_of("rest", *[f"rates.{rate}" for rate in ODD]), 200),
 }
 MORE_RUNS = {

@@ -4,6 +4,7 @@ import signal
 import threading
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from error_lines import said
 from first_in_line import going_first
@@ -29,7 +30,13 @@ from cspm_msgs_py.errors import InputError  # noqa: E402
 from cspm_msgs_py.graph import RECORDER  # noqa: E402
 from cspm_msgs_py.recording import Recording, overview  # noqa: E402
 from cspm_msgs_py.recording.recover import recover  # noqa: E402
-from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT, TENSION, TORQUE_COMMAND  # noqa: E402
+from cspm_msgs_py.schedule import (  # noqa: E402
+    FORCE_CONTROLLER,
+    PLANT,
+    TENSION,
+    TENSION_COMMAND,
+    TORQUE_COMMAND,
+)
 from cspm_msgs_py.topics import EMERGENCY_STOP  # noqa: E402
 from cspm_ros.runtime.exit_watchdog import IN_ORDER  # noqa: E402
 from cspm_ros.runtime.realtime_run import run_realtime  # noqa: E402 - after ROS is known to be there
@@ -79,6 +86,21 @@ def test_every_message_that_is_sent_is_recorded(tmp_path, plant):
     # The plant heard no command that is not recorded.
     assert 600 - result.timing[PLANT]["deadlines_missed"] <= sent
     assert max(result.statistics.max_error[:3]) < 0.01
+
+
+def test_drives_that_take_tensions_are_never_late_for_their_loop(tmp_path):
+    bundle = slow_bundle("drive=tension", "rates.load_cells=200")
+    with going_first():
+        result = run_realtime(bundle, tmp_path / "bag", steps=600, domain_id=new_domain())
+    assert result.failure is None
+    evidence = Evidence(tmp_path / "bag")
+    torques, tensions = evidence.rows[TORQUE_COMMAND], evidence.rows[TENSION]
+    # One answers each tension from the first wanted one on, and none is somebody else's.
+    first = int(np.searchsorted(tensions.stamp_ns, torques.stamp_ns[0]))
+    assert torques.stamp_ns.tolist() == tensions.stamp_ns[first:].tolist()
+    assert result.timing[FORCE_CONTROLLER]["deadlines_missed"] == 0
+    assert result.timing[PLANT]["refused"] == 0
+    assert len(evidence.rows[TENSION_COMMAND].stamp_ns) > 250
 
 
 def test_at_1_khz_nothing_is_lost_however_late_the_nodes_are(tmp_path):

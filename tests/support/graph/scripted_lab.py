@@ -9,7 +9,14 @@ from cspm_msgs_py.message import message_of
 from cspm_msgs_py.ros.contract_node import ros_class
 from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros_types import serialize
-from cspm_msgs_py.schedule import BAR_POSE, FRAME_POSE, TENSION, TORQUE_COMMAND, WINCH_STATE
+from cspm_msgs_py.schedule import (
+    BAR_POSE,
+    FRAME_POSE,
+    TENSION,
+    TENSION_COMMAND,
+    TORQUE_COMMAND,
+    WINCH_STATE,
+)
 
 CLAMPED = Path(__file__).resolve().parents[3] / "examples" / "clamped_bar.yaml"
 RATE = 200
@@ -38,6 +45,7 @@ class ScriptedLab:
         reported: what is added to the torques that the drives report, (n,) [N·m].
         at_fault: the drive that reports wrong torques, by its number.
         stuck: the load cell that repeats itself, by its number; None: none does.
+        takes_tensions: whether the drives obey tension commands.
         turning: speed of all motors [rad/s].
         standing: the encoder that stands while its motor turns, by its number.
     """
@@ -51,6 +59,7 @@ class ScriptedLab:
         self.torques = 5.0 * self.radii
         self.reported, self.at_fault = np.zeros(len(self.radii)), 0
         self.stuck: int | None = None
+        self.takes_tensions = False
         self.turning, self.standing = 0.0, None
         self._wound = np.zeros(len(self.radii))
         self._tensions, self._angles = np.zeros(len(self.radii)), np.zeros(len(self.radii))
@@ -64,6 +73,7 @@ class ScriptedLab:
         }
         self._send |= dict.fromkeys(mute, lambda *_: None)
         self._node.subscribe_rows(topics[TORQUE_COMMAND], self._command, lambda _: None)
+        self._node.subscribe_rows(topics[TENSION_COMMAND], self._wind, lambda _: None)
         session.every(1.0 / RATE, self._measure)
 
     def _best_effort(self, topic):
@@ -90,6 +100,11 @@ class ScriptedLab:
 
     def _command(self, _, row):
         self.torques = np.maximum(row, 0.0)
+
+    def _wind(self, _, row):
+        """Close the loop of drives that take tensions."""
+        if self.takes_tensions:
+            self.torques = row * self.radii
 
     def _noise(self):
         return NOISE * self._rng.standard_normal(len(self.radii))

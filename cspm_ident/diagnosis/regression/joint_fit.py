@@ -235,5 +235,16 @@ class Fits:
         return is_negligible({c: found[c] for c in hypothesis.candidates})
 
     def is_calibration(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
-        """Return whether it moves surveyed places by no more than their accuracy."""
-        return is_surveyed(hypothesis.effect) and self.is_negligible(hypothesis, chosen)
+        """Return whether it moves surveyed places by no more than their accuracy.
+
+        What is not significant does not count: motion in few directions leaves some undetermined.
+        """
+        if not is_surveyed(hypothesis.effect):
+            return False
+        found = self.weights(chosen)
+        sure = {
+            c: np.where(np.abs(weights) > half, weights, 0.0)
+            for c, (weights, half) in found.items()
+            if c in hypothesis.candidates
+        }
+        return is_negligible(sure)

@@ -21,6 +21,7 @@ from cspm_ident.diagnosis.regression.hypothesis import (
     has_one_system,
     is_number,
     is_spread,
+    is_surveyed,
     is_wider,
     joined,
     may_be_none,
@@ -349,7 +350,7 @@ class Search:
         together = [*chosen, hypothesis]
         if not self.fits.is_plausible(together) or self.fits.contradicts(hypothesis, chosen):
             return None
-        if self.fits.is_calibration(hypothesis, together):
+        if is_surveyed(hypothesis.effect) and self.fits.is_negligible(hypothesis, together):
             return None
         gained = before - self.fits.held_out(hypothesis, base)
         known = len(chosen)

@@ -18,6 +18,7 @@ from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.diagnosis.validation.holdout_simulation import LEAD_S
 from cspm_ident.diagnosis.validation.materiality import accuracy_of
+from cspm_ident.diagnosis.validation.recalibration import recalibrated, surveyed_in
 from cspm_ident.diagnosis.validation.remainder import Remainder, independent_noise, remainders_of
 from cspm_ident.signals.measurement import Measurement
 
@@ -188,11 +189,12 @@ def residuals_of(
         noise: noise of each residual, its unit.
         thresholds: those of residuals.
     """
+    ends = surveyed_in(weights)
     parts = [
         [
             equation.within(start, np.inf)
             for equation in equations_of(
-                as_found(m.since(start - LEAD_S), weights), (), thresholds=thresholds
+                as_found(m.since(start - LEAD_S), weights), ends, thresholds=thresholds
             )
         ]
         for m, start in measurements
@@ -201,5 +203,5 @@ def residuals_of(
     for part in in_noise(parts, noise):
         for equation in part:
             if len(equation.times):
-                found.setdefault(equation.place, []).append(equation)
+                found.setdefault(equation.place, []).append(recalibrated(equation, weights))
     return found

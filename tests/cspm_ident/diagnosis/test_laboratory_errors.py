@@ -49,19 +49,30 @@ def test_what_is_off_on_a_rig_is_named_where_it_is(
     assert low <= truth <= high
 
 
-def test_an_attachment_is_distinguished_from_a_survey_of_all_ends(tmp_path):
-    """0.7 mm everywhere is calibrated; 10 mm at one attachment are a wrong number of the file."""
-    scenario, size = cspm.load_scenario("calm"), np.random.default_rng(2)
+def surveyed(folder, *, off, size, seed):
+    """A run of the thesis's machine with all ends off, one attachment by more, diagnosed."""
+    scenario, draw = cspm.load_scenario("calm"), np.random.default_rng(seed)
     machine = scenario.testbed
     for cable in machine.cables:
         for effect in ("cable_exit_offset", "cable_attachment_offset"):
-            moved = dict(zip("xyz", size.normal(0.0, 7e-4, 3), strict=True))
-            if (effect, cable) == ("cable_attachment_offset", "surge_1"):
-                moved = {"x": 0.01, "y": 0.0, "z": 0.0}
+            moved = dict(zip("xyz", draw.normal(0.0, size, 3), strict=True))
+            if off and (effect, cable) == ("cable_attachment_offset", "surge_1"):
+                moved = {"x": off, "y": 0.0, "z": 0.0}
             machine = machine.with_effect(effect, cable, **moved)
-    run = cspm.simulate(scenario, testbed=machine, seed=2, duration=20.0)
-    recording = run.save(tmp_path / "recorded")
-    found = cspm.diagnose(recording, testbed=scenario.testbed, closed_loop=False)
+    run = cspm.simulate(scenario, testbed=machine, seed=seed, duration=20.0)
+    recording = run.save(folder / "recorded")
+    return cspm.diagnose(recording, testbed=scenario.testbed, closed_loop=False)
+
+
+def test_ends_of_eight_cables_a_millimetre_off_are_no_fault(tmp_path):
+    found = surveyed(tmp_path, off=0.0, size=1e-3, seed=3)
+    assert (found.verdict, len(found.findings)) == ("consistent", 0)
+    assert {each["accuracy"] for each in found.data["calibrated"]} == {1e-3}
+
+
+def test_an_attachment_is_distinguished_from_a_survey_of_all_ends(tmp_path):
+    """0.7 mm everywhere is calibrated; 10 mm at one attachment are a wrong number of the file."""
+    found = surveyed(tmp_path, off=0.01, size=7e-4, seed=2)
     (finding,) = found.findings
     assert (found.verdict, list(finding.elements)) == ("parameter", ["surge_1"])
     low, high = finding.parameters["x"].ci95

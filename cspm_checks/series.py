@@ -57,8 +57,10 @@ class SensorSeries(NamedTuple):
 
 def series_of(topic: TopicColumns, field: str, origin_ns: int) -> SensorSeries:
     """Return a field of a topic in order of time, without NaN; times from the origin [ns]."""
-    values = topic.values(field)
-    order = np.argsort(topic.stamp_ns, kind="stable")
-    order = order[~np.isnan(values[order])]
-    time = np.asarray((topic.stamp_ns[order] - origin_ns) * 1e-9, dtype=np.float64)
-    return SensorSeries(time, values[order])
+    values, stamps = topic.values(field), topic.stamp_ns
+    if (np.diff(stamps) < 0).any():
+        order = np.argsort(stamps, kind="stable")
+        values, stamps = values[order], stamps[order]
+    known = ~np.isnan(values)
+    time = np.asarray((stamps[known] - origin_ns) * 1e-9, dtype=np.float64)
+    return SensorSeries(time, values[known])

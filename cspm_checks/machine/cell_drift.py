@@ -28,7 +28,7 @@ MATERIAL = 0.01
 APART = 1.5
 """Times what the next cell explains."""
 _FEWEST_BLOCKS = 20
-_LONGEST = 200_000
+_LONGEST = 2_000_000
 
 
 class Drift(NamedTuple):
@@ -64,8 +64,7 @@ def cell_drift(
     if testbed.bar is None or length < 3 or blocks < _FEWEST_BLOCKS:
         return None
     count = blocks * length
-    arms, wrenches, time = _wrenches(testbed, testbed.bar, bar, frame, tensions, step, count)
-    arms, wrenches, time = (_means(each, length) for each in (arms, wrenches, time))
+    arms, wrenches, time = _wrenches(testbed, testbed.bar, bar, frame, tensions, (count, length))
     seconds = time - time.mean()
     free = [-arms[:, j].ravel() for j in range(arms.shape[1])]
     free += [np.tile(unit, len(seconds)) for unit in np.eye(wrenches.shape[1])]
@@ -92,19 +91,25 @@ def _wrenches(
     bar: Poses,
     frame: Poses | None,
     tensions: list[SensorSeries],
-    step: float,
-    count: int,
+    blocks: tuple[int, int],
 ) -> tuple[Array, Array, Array]:
-    """Return the cables' wrenches per tension (k, n, 6), what is left (k, 6) [N], and instants."""
-    cables = nominal_parameters(testbed).cables
-    poses = bar.with_angles()[:count]
-    bases = np.zeros_like(poses) if frame is None else frame.at(bar.time).with_angles()[:count]
-    arms = np.empty((count, len(cables), 6))
+    """Return the cables' wrenches per tension (k, n, 6), what is left (k, 6) [N], and instants.
+
+    All are of the means over blocks, of which `blocks` has all samples and those of one.
+    """
+    count, length = blocks
+    cables, instants = nominal_parameters(testbed).cables, bar.time[:count]
+    step = float(np.median(np.diff(instants)))
+    whole = bar.with_angles()[:count]
+    acceleration = _means(np.stack([smoothed(each, 2, step) for each in whole.T], axis=1), length)
+    series = [np.interp(instants, one.time, one.values) for one in tensions]
+    pulls, poses = _means(np.stack(series, axis=1), length), _means(whole, length)
+    time = _means(instants, length)
+    bases = np.zeros_like(poses) if frame is None else frame.at(time).with_angles()
+    arms = np.empty((len(poses), len(cables), 6))
     lengths, of_frame = np.empty(len(cables)), np.empty((len(cables), 6))
-    for k in range(count):
+    for k in range(len(poses)):
         cable_geometry(cables, poses[k], bases[k], lengths, arms[k], of_frame)
-    pulls = np.stack([np.interp(bar.time[:count], one.time, one.values) for one in tensions], 1)
-    acceleration = np.stack([smoothed(column, 2, step) for column in poses.T], axis=1)
     left = -np.einsum("kni,kn->ki", arms, pulls)
     left[:, 2] += body.mass * testbed.gravity
     left[:, :3] -= body.mass * acceleration[:, :3]
@@ -113,7 +118,7 @@ def _wrenches(
     gyration = np.sqrt(np.trace(np.asarray(body.inertia.matrix)) / 3.0 / body.mass)
     scale = np.array([1.0, 1.0, 1.0, *(1.0 / gyration,) * 3])
     moving = np.abs(arms * scale).max(axis=(0, 1)) > 1e-6
-    return (arms * scale)[:, :, moving], (left * scale)[:, moving], bar.time[:count]
+    return (arms * scale)[:, :, moving], (left * scale)[:, moving], time
 
 
 def _means(table: Array, length: int) -> Array:

@@ -24,6 +24,7 @@ LESS = 0.5
 two are pulled alike leave as much; with the right one nine tenths go."""
 EXPLAINED = 0.5
 PARTS = 4
+_MOST_ROWS = 20_000
 
 
 class _Drive(NamedTuple):
@@ -119,7 +120,8 @@ def _drive(
     motion = [*motion_columns(values, step, (2, 1)), np.ones(len(time))]
     pulls = [radius * smoothed(np.interp(time, one.time, one.values)) for one in tensions]
     goal = smoothed(np.interp(time, torque.time, torque.values))
-    return _Drive(goal, np.stack(motion, axis=1), np.stack(pulls, axis=1))
+    every = slice(None, None, max(len(time) // _MOST_ROWS, 1))
+    return _Drive(goal[every], np.stack(motion, axis=1)[every], np.stack(pulls, axis=1)[every])
 
 
 def _left(drive: _Drive, part: int) -> Array:

@@ -12,10 +12,15 @@ SHARE = 0.01
 """Of the samples: what is at the limit less often moves no estimate by more."""
 
 
+def at_limit(torque: Array, limit: float) -> NDArray[np.bool_]:
+    """Return at which samples, shape (n,), a torque is at its limit [N·m]."""
+    return np.asarray(np.abs(torque) >= LIMIT * limit)
+
+
 def limited_share(torque: Array, limit: float) -> float:
     """Return the share of samples, shape (n,), at which a torque is at its limit [N·m]."""
     known = torque[~np.isnan(torque)]
-    return float(np.mean(np.abs(known) >= LIMIT * limit)) if len(known) else 0.0
+    return float(np.mean(at_limit(known, limit))) if len(known) else 0.0
 
 
 def limit_text(share: float, limit: float) -> str:

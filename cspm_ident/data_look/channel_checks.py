@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_checks.drive_limit import at_limit
 from cspm_ident.data_look.data_check import DataCheck, check_of
 from cspm_ident.signals.jumps import jumps
 from cspm_ident.signals.measurement import Measurement
@@ -22,8 +23,6 @@ _MOVING = 0.2
 _SATURATED_S = 0.1
 # Of the time: what lasts shorter moves no estimate by more.
 _SHARE = 0.01
-# Of the torque limit: rounding of the drive.
-_LIMIT = 0.995
 _PARTS = ("angle", "torque", "tension", "speed")
 
 
@@ -73,8 +72,8 @@ def saturation_check(measurement: Measurement) -> DataCheck:
         cable = next(each for each in measurement.machine.cables if each.name == name)
         if part != "torque":
             continue
-        at_limit = np.abs(column.values[:, 0]) >= _LIMIT * cable.torque_limit
-        share = _lasting(at_limit, _SATURATED_S, column) / max(measurement.duration, 1e-9)
+        limited = at_limit(column.values[:, 0], cable.torque_limit)
+        share = _lasting(limited, _SATURATED_S, column) / max(measurement.duration, 1e-9)
         if share > _SHARE:
             found.append(
                 f"the drive of {name} is at its limit of {cable.torque_limit:.3g} N·m for"

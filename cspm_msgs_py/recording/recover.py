@@ -105,6 +105,11 @@ def _files(path: Path) -> tuple[list[Path], bool]:
     """Return the files of a recording, and whether their messages are compressed one by one."""
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
+    if path.suffix == ".bag":
+        raise InputError(
+            f"{path}: a ROS 1 bag, allowed: MCAP; `cspm import` and `cspm replay` read a ROS 1 bag"
+            " as far as it goes"
+        )
     if not path.is_dir():
         return [path], False
     if (path / FILE_NAME).exists():

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import CsvFormat
+from cspm_ident.importing.sources.number_text import is_number
 from cspm_ident.importing.sources.row_choice import Labels
 from cspm_ident.importing.sources.row_shape import RowShape
 from cspm_ident.importing.sources.source import Progress
@@ -207,7 +208,7 @@ class CsvSource(TableSource):
                 where = f"{self.path}: line {number}, column '{self.columns[place]}'"
                 if place >= len(cells):
                     raise InputError(f"{where}: only {len(cells)} cells, allowed: {self._width}")
-                if place not in exact and not _is_number(cells[place]):
+                if place not in exact and not is_number(cells[place]):
                     raise InputError(
                         f"{where}: '{cells[place].strip()}', allowed: a number, nothing, or a text"
                         " named in csv.missing"
@@ -219,11 +220,3 @@ def _undecodable(path: Path, err: UnicodeDecodeError) -> str:
         f"{path}: no {err.encoding} text ({err.reason}), allowed: as csv.encoding says; programs of"
         " Windows often write cp1252"
     )
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

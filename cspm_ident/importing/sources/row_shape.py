@@ -9,6 +9,7 @@ from io import StringIO
 from pathlib import Path
 
 from cspm_ident.importing.mapping import CsvFormat
+from cspm_ident.importing.sources.number_text import is_number
 from cspm_msgs_py.errors import InputError
 
 _SHOWN = 6
@@ -129,7 +130,7 @@ class RowShape:
             if "." not in row:
                 continue
             for place, cell in self._chosen(row, numeric):
-                if "." in cell and _is_number(cell.replace(".", "").replace(",", ".")):
+                if "." in cell and is_number(cell.replace(".", "").replace(",", ".")):
                     raise InputError(
                         f"{self._path}: line {line + i}, column '{self._names[place]}': '{cell}'"
                         " has a point where csv.decimal is a comma, allowed: csv.thousands: '.'"
@@ -170,11 +171,3 @@ def _grouping(form: CsvFormat) -> re.Pattern[str] | None:
         return None
     mark, point = re.escape(form.thousands), re.escape(form.decimal)
     return re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{mark}\d{{3}})+(?:{point}\d*)?(?:[eE][+-]?\d+)?$")
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

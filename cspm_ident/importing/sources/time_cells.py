@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_ident.importing.sources.number_text import is_number
 from cspm_ident.importing.time_text import TEXT_UNITS, nanoseconds, unit_of_text
 from cspm_msgs_py.errors import InputError
 
@@ -60,7 +61,7 @@ class TimeCells:
     def _find_unit(self, cells: NDArray[np.str_], line_of: Callable[[int], int]) -> None:
         """Take the unit of texts that can be of one only."""
         known = enumerate(cell.strip() for cell in cells.tolist())
-        at, first = next((i, cell) for i, cell in known if cell and not _is_number(cell))
+        at, first = next((i, cell) for i, cell in known if cell and not is_number(cell))
         found = None if self._numbers else unit_of_text(first)
         if self.unit is not None or found is None:
             raise InputError(self._refusal(first, line_of(at)))
@@ -72,11 +73,3 @@ class TimeCells:
             return f"{where} a text as {TEXT_UNITS[str(self.unit)]} by unit {self.unit}"
         forms = ", ".join(f"{unit} ({example})" for unit, example in TEXT_UNITS.items())
         return f"{where} a number, or a text with its unit of: {forms}"
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from rich.console import Console
 
 from cspm.commands.progress_shown import shown
 from cspm.commands.view_command import page_of
-from cspm.demo.concealment import Concealed, drawn
+from cspm.demo.concealment import CONCEALABLE, Concealed, drawn
 from cspm.demo.guess import choices, guessed
 from cspm.diagnosis import Diagnosis, diagnose
 from cspm.recorded import Recording
@@ -65,10 +66,10 @@ def demo_command(request: DemoRequest, json: Path | None) -> None:
     truth = drawn(described, random, count, share, request.effect)
     recording, described_run = _recorded(console, request, described, truth)
     _show(console, described_run, recording)
-    answer = _guess(console, described, truth, random) if request.ask else None
-    found = _diagnosed(console, recording, described)
+    answer = guess_of(console, described, truth, random) if request.ask else None
+    found = diagnosed(console, recording, described)
     found.write(request.out / VERDICT)
-    _reveal(console, found, truth, answer)
+    reveal(console, found, truth, answer)
     after = _improved(console, request, found, recording, described_run)
     _conclude(console, request, recording)
     if json is not None:
@@ -118,22 +119,49 @@ def differences(recording: Recording, model: Run) -> list[str]:
     return rows
 
 
-def _guess(
-    console: Console, described: Testbed, truth: list[Concealed], random: np.random.Generator
+def guess_of(
+    console: Console,
+    described: Testbed,
+    truth: list[Concealed],
+    random: np.random.Generator,
+    names: Sequence[str] = tuple(CONCEALABLE),
 ) -> Concealed | None:
+    """Return what somebody at the terminal guesses; None where nothing is.
+
+    Args:
+        console: to ask on.
+        described: the machine as described.
+        truth: what is concealed.
+        random: order of what is offered.
+        names: effects that are offered besides.
+    """
     say(console, "3  What is it?")
-    offered = choices(described, truth[0], random)
+    offered = choices(described, truth[0], random, names)
     try:
         return guessed(offered, input, lambda line: say(console, line))
     except EOFError:
         return None
 
 
-def _diagnosed(console: Console, recording: Recording, described: Testbed) -> Diagnosis:
+def diagnosed(
+    console: Console,
+    recording: Recording,
+    described: Testbed,
+    held_out: Sequence[Recording] = (),
+) -> Diagnosis:
+    """Diagnose a recording, and say what is found.
+
+    Args:
+        console: to say it on.
+        recording: to search.
+        described: the machine as described.
+        held_out: what is judged; if empty, the last part of the recording.
+    """
     with shown(console, "diagnosing") as progress:
         found = diagnose(
             recording,
             testbed=described,
+            held_out=held_out,
             closed_loop=False,
             progress=lambda share, what: progress(share, f"diagnosing: {what}"),
         )
@@ -154,9 +182,10 @@ def named(found: Diagnosis, truth: Concealed) -> bool:
     )
 
 
-def _reveal(
+def reveal(
     console: Console, found: Diagnosis, truth: list[Concealed], answer: Concealed | None
 ) -> None:
+    """Say what was concealed, and whether diagnosis and guess were right."""
     say(console, "5  What was concealed:")
     for each in truth:
         verdict = "named" if named(found, each) else "not named"

@@ -12,13 +12,25 @@ from cspm.testbed import Testbed
 CHOICES = 5
 
 
-def choices(testbed: Testbed, truth: Concealed, random: Generator) -> list[Concealed]:
-    """Return what may be guessed, in chance order: the truth, its effect elsewhere, others."""
+def choices(
+    testbed: Testbed,
+    truth: Concealed,
+    random: Generator,
+    names: Sequence[str] = tuple(CONCEALABLE),
+) -> list[Concealed]:
+    """Return what may be guessed, in chance order: the truth, its effect elsewhere, others.
+
+    Args:
+        testbed: whose parts are offered.
+        truth: what is concealed.
+        random: where chance comes from.
+        names: effects that are offered besides.
+    """
     found = [truth]
     elsewhere = [name for name in testbed.cables if name != truth.element]
     if truth.element != BAR and elsewhere:
         found.append(Concealed(truth.effect, str(random.choice(elsewhere)), {}))
-    for name in random.permutation([name for name in CONCEALABLE if name != truth.effect]):
+    for name in random.permutation([name for name in names if name != truth.effect]):
         element = BAR if name.startswith(BAR) else str(random.choice(testbed.cables))
         found.append(Concealed(str(name), element, {}))
     found = found[:CHOICES]

@@ -13,6 +13,7 @@ from bench.concealed.case import AS_IT_IS, DELETION, SPIKE, Case, cases_of, conc
 from bench.concealed.diagnose_all import diagnose_all
 from bench.concealed.machine import Machine, machines
 from bench.concealed.page import board, draw_curve, misses
+from bench.concealed.scatter import FURTHER, Estimate, agreeing
 from bench.concealed.score import groups, judged, read_own
 from bench.real.dataset import Dataset
 from bench.real.least_squares import least_squares
@@ -269,6 +270,14 @@ def test_a_folder_without_any_data_set_is_one_line(tmp_path, monkeypatch, capsys
     assert (
         "allowed: a folder with dfki_pendulum_bsd3, kitepower_ccby, kuka" in capsys.readouterr().err
     )
+
+
+def test_runs_agree_where_their_intervals_hold_the_difference():
+    runs = [Estimate("A", 1.0, 0.1), Estimate("B", 1.12, 0.1), Estimate("C", 1.3, 0.1)]
+    assert agreeing(runs[:2]) == (1, 1)
+    assert agreeing(runs) == (1, 3)
+    assert agreeing(runs[:1]) == (0, 0)
+    assert {*FURTHER} < {machine.name for machine in machines()}
 
 
 @pytest.mark.slow

@@ -67,6 +67,7 @@ NOT_RUN: dict[str, str] = {
     "export ROS_": f"of several computers; {ROS_TESTS}/runtime/test_network_namespaces.py",
     "pip install": "needs a network; tests/project/test_wheel.py",
     "pip wheel": "needs a network; tests/project/test_wheel.py",
+    "cspm data get": "needs a network; tests/cspm/open_data",
     "cspm info recordings/my_bag": "a bag of the reader; tests/cspm_ident/importing",
     "cspm import log.": "logs of the reader; tests/cspm_ident/importing/test_actuator_logs.py",
     "cspm identify winch swing": "a log of the reader; tests/cspm_ident/winch",

@@ -75,7 +75,7 @@ def demo(
     folder = out if out is not None else new_folder("demo")
     drawn = secrets.randbelow(_SEEDS) if seed is None else seed
     if real is not None:
-        from cspm.commands.demo_real_command import RealDemoRequest, demo_real_command
+        from cspm.commands.recordings.demo_real_command import RealDemoRequest, demo_real_command
 
         if hard:
             raise InputError("--real --hard: allowed: one of both")

@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
-from cspm.commands.demo_real_command import RealDemoRequest, demo_real_command
+from cspm.commands.recordings.demo_real_command import RealDemoRequest, demo_real_command
 from cspm.open_data.source import MACHINES, source_of
 from cspm_msgs_py.errors import InputError
 

@@ -46,6 +46,10 @@ class GuardPorts:
         self._reported: tuple[bool, bool] | None = None
         self._since_report = 0
 
+    def set_brake(self) -> None:
+        """Set the brakes now, whatever the guard says: the run ends."""
+        self._brake.publish(self._bool(data=True))
+
     def _stop(self, message: object) -> None:
         self._guard.emergency_stop(self._now_ns(), bool(message.data))  # type: ignore[attr-defined]
 

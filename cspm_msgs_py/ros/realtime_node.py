@@ -15,6 +15,8 @@ from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
 from cspm_msgs_py.ros.fault_line import FaultLine
 from cspm_msgs_py.ros.graph_publishers import bind
 from cspm_msgs_py.ros.guard_ports import GuardPorts
+from cspm_msgs_py.ros.local_name import local
+from cspm_msgs_py.ros.qos import contract_qos
 from cspm_msgs_py.ros.rendezvous import FollowerSide
 from cspm_msgs_py.ros.stage_node import Publish, commanding
 from cspm_msgs_py.schedule import (
@@ -30,7 +32,7 @@ from cspm_msgs_py.stepping.plausibility import Plausibility
 from cspm_msgs_py.stepping.proof import Proof
 from cspm_msgs_py.stepping.sample_and_hold import SampleAndHold, WallTrajectory
 from cspm_msgs_py.stepping.stage import Guard, Stage
-from cspm_msgs_py.topics import DIAGNOSTICS, EMERGENCY_STOP, QOS_DEPTH, SAFE, Topic
+from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, EMERGENCY_STOP, QOS_DEPTH, SAFE, Topic
 
 Array = NDArray[np.float64]
 # While processes find each other they stand still for some tenths of a second.
@@ -78,6 +80,7 @@ class RealtimeNode:
         self._node, self._guard = node, guard
         self._on_start, self._on_safe = on_start, on_safe
         self._proof, self._steadily = proof, False
+        self._set_brake: Callable[[], None] = lambda: None
         node.keep_time()
         read = [name for name in (*plan.inputs, *plan.held) if name != CLOCK]
         self._now_ns = node.now_ns if link is None else link.now_ns
@@ -149,11 +152,15 @@ class RealtimeNode:
         """Offer the guard's ports, or hear of the safe state where another node is `guarded`."""
         node, guard = self._node, self._guard
         if guard is None and self._driven:
+            kind = ros_class(BRAKE.ros_type)
+            brake = node.node.create_publisher(kind, local(BRAKE.name), contract_qos())
+            self._set_brake = lambda: brake.publish(kind(data=True))
             self._node.subscribe_objects(
                 EMERGENCY_STOP.name, ros_class(EMERGENCY_STOP.ros_type), self._stop, QOS_DEPTH
             )
         if guard is not None:
-            GuardPorts(node, guard, self._now_ns, self._reset, lambda: self._loop.begun)
+            ports = GuardPorts(node, guard, self._now_ns, self._reset, lambda: self._loop.begun)
+            self._set_brake = ports.set_brake
         elif guarded:
             BoundFlag(node, SAFE, FORCE_CONTROLLER, self._note_safe, self._refuse)
 
@@ -254,7 +261,17 @@ class RealtimeNode:
             proof.close()
         elif not self._steadily or not (proof.under_way or self._leader.asked()):
             proof.restart()
-        elif (command := proof.command(self._now_ns())) is not None:
+        else:
+            self._command(proof)
+
+    def _command(self, proof: Proof) -> None:
+        try:
+            command = proof.command(self._now_ns())
+        except InputError:
+            # The drives miss the commands only once their watchdogs have waited.
+            self._set_brake()
+            raise
+        if command is not None:
             stamp_ns, row = command
             self._publish[self._driven[0]](stamp_ns, stamp_ns, row)
 

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 TRAVEL = 0.001  # m of cable, each way
 FARTHEST = 0.008  # m that any winch may turn by
+# At first all winches only hold [s], and hardly turn [m]: a torque of the wrong sign shows there.
+HOLD_S, STILL = 0.2, 0.003
 RAMP_S, SETTLE_S, MEASURE_S = 0.8, 0.1, 0.1
 FEWEST_ROWS = 3  # of each topic on a plateau
 SLOW = 0.005  # m/s, beyond which no more force is given
@@ -69,7 +71,7 @@ class WinchWiggle:
         more, less = MORE_SHARE * (highest - tensions), LESS_SHARE * tensions
         self._bounds = np.maximum(LEAST_FORCE, [more, less])
         self._before: Array | None = None
-        self._last_ns, self._arrived_ns = 0, -1
+        self._first_ns, self._last_ns, self._arrived_ns = 0, 0, -1
         self._winch, self._way, self._force, self._measured = 0, 0, 0.0, 0
         self.measuring: Plateau | None = None
 
@@ -86,12 +88,14 @@ class WinchWiggle:
         """
         torque = self._hold.torque(now_ns, winches)
         if self._before is None:
-            self._before, self._last_ns = winches.angles.copy(), now_ns
+            self._before = winches.angles.copy()
+            self._first_ns = self._last_ns = now_ns
+        holding = now_ns - self._first_ns < HOLD_S * 1e9
         turned = self._radii * (winches.angles - self._before)
-        self._check(turned)
+        self._check(turned, STILL if holding else FARTHEST)
         passed = min(LONGEST_STEP_S, (now_ns - self._last_ns) * 1e-9)
         self._last_ns = now_ns
-        if not self.done:
+        if not (self.done or holding):
             speed = float(self._radii[self._winch] * winches.speeds[self._winch])
             self._advance(now_ns, passed, float(turned[self._winch]), speed)
         if not self.done:
@@ -124,9 +128,9 @@ class WinchWiggle:
         if self._force == 0.0:
             self._winch, self._way = self._winch + 1, 0
 
-    def _check(self, turned: Array) -> None:
+    def _check(self, turned: Array, allowed: float) -> None:
         far = int(np.argmax(np.abs(turned)))
-        if abs(turned[far]) <= FARTHEST:
+        if abs(turned[far]) <= allowed:
             return
         verb = "wound in" if turned[far] > 0.0 else "paid out"
         cause = "while all winches were to hold"
@@ -134,5 +138,5 @@ class WinchWiggle:
             cause = f"while {self._names[self._winch]} was given {self._force:+.2g} N"
         raise InputError(
             f"drivers: wiggle: {self._names[far]} {verb} {1e3 * abs(turned[far]):.1f} mm {cause},"
-            f" allowed: {1e3 * FARTHEST:g} mm; is a sign inverted, or the torque in another unit?"
+            f" allowed: {1e3 * allowed:g} mm; is a sign inverted, or the torque in another unit?"
         )

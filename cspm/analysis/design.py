@@ -14,6 +14,7 @@ from cspm.analysis.machine import DEFAULT_SCENARIO, AnalyzedMachine, analyzed_ma
 from cspm.scenario import AnyScenario
 from cspm.testbed import AnyTestbed
 from cspm_control.analysis.cable_groups import cable_groups
+from cspm_control.analysis.delay_margin import largest_age
 from cspm_control.analysis.loop_view import LoopView
 from cspm_control.analysis.loops import LoopAnalysis, analyse_loops, pid_law
 from cspm_control.analysis.sampled_loops import LoopTiming, timing_of
@@ -21,6 +22,7 @@ from cspm_msgs_py.control_spec.force import PiGains
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import new_folder
 from cspm_msgs_py.scenario import ClosedLoop
+from cspm_msgs_py.scenario_keys.drive import TENSION_DRIVE, TORQUE_DRIVE
 from cspm_run.assembly import resolve
 from cspm_run.stability.loop_growth import period_of_force
 
@@ -51,9 +53,20 @@ class Design:
         """Kinds of cables, each with its first cable, and every cable with gains of its own."""
         return gain_groups(self.machine.testbed.cable_names, self.control.force.gains or {})
 
+    @property
+    def largest_ages(self) -> dict[str, float]:
+        """How old the state may be that a command answers [s], by what the drives take."""
+        scenario = self.machine.scenario.model_copy(update={"control": self.control})
+        return {
+            drive: largest_age(scenario.model_copy(update={"drive": drive}), self.machine.testbed)
+            for drive in (TORQUE_DRIVE, TENSION_DRIVE)
+        }
+
     def data(self) -> dict[str, Any]:
         """Return everything as plain data: what `cspm analyze design --json` writes."""
-        return _data(self.machine, self.control, self.result, self.timing)
+        found = _data(self.machine, self.control, self.result, self.timing)
+        ages = {k: age if np.isfinite(age) else None for k, age in self.largest_ages.items()}
+        return found | {"largest_age": ages}
 
     def write(self, folder: str | Path) -> tuple[Path, ...]:
         """Draw the loops; return the pictures' paths.

@@ -10,6 +10,7 @@ import pytest
 from run_samples import bundle_of
 
 from bench.performance.slow_machine import slow_overrides
+from cspm.analysis.design import analyze_design
 from cspm_control.analysis.delay_margin import largest_age
 from cspm_control.safety import GuardedStage
 from cspm_msgs_py.errors import InputError
@@ -262,3 +263,8 @@ def test_drives_that_take_tensions_leave_the_margin_of_the_motion_loops():
     least = largest_age(drives.scenario, drives.testbed.testbed)
     assert 0.04 < least < 0.06
     assert lateness_ns(drives) == round(least * 1e9)
+    # `cspm analyze design` says the same of both.
+    rest = bundle_of("rest")
+    ages = analyze_design("rest").data()["largest_age"]
+    assert ages["tension"] == pytest.approx(least)
+    assert ages["torque"] == pytest.approx(largest_age(rest.scenario, rest.testbed.testbed))

@@ -70,6 +70,12 @@ def analyze_design_command(
     with shown(console, "loops"):
         found = design_of(machine, computing)
     _show(console, machine, found.control, found.result, found.timing, found.groups)
+    torque, tension = (1e3 * age for age in found.largest_ages.values())
+    say(
+        console,
+        f"in real time a torque may answer a state {torque:.3g} ms old, with drive: tension a"
+        f" tension one {tension:.3g} ms old; later ones trip",
+    )
     if folder is not None:
         say(console, f"written {', '.join(map(str, found.write(folder)))}")
     if json is not None:

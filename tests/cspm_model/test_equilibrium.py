@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from machines import build, general_content, point_content, random_poses, with_bar
+from machines import THESIS, build, general_content, point_content, random_poses, with_bar
 from scipy.optimize import linprog, minimize
 from scipy.spatial.transform import Rotation
 
@@ -13,6 +13,7 @@ from cspm_model.equilibrium import (
 from cspm_model.kernels.cable import elastic_tension, law_scale
 from cspm_model.kinematics import geometry
 from cspm_msgs_py.errors import ConvergenceError
+from cspm_msgs_py.testbed import load_testbed
 from cspm_sim.parameters import plant_parameters
 
 ORIGIN = np.zeros(6)
@@ -109,6 +110,16 @@ def test_the_thesis_machine_rolls_a_little_where_its_ends_are_a_millimetre_off(t
     assert np.delete(found.bar_pose, 3) == pytest.approx(np.delete(CENTRE, 3), abs=0.0)
     assert abs(found.bar_pose[3]) < 0.1
     assert (found.tensions >= limits_of(off)[:, 0] - 1e-9).all()
+
+
+def test_a_plate_on_four_cables_turns_to_where_they_balance_it():
+    """They give four directions of six; beside the middle of the frame it does not hang level."""
+    testbed = load_testbed(THESIS.with_name("suspended_four.yaml")).testbed
+    pose = np.array([0.2, 0.1, 1.2, 0.0, 0.0, 0.0])
+    found = rest(testbed, pose)
+    assert balance(testbed, found) == pytest.approx(0.0, abs=1e-8)
+    assert np.abs(found.bar_pose - pose).max() > 1e-3
+    assert (found.tensions >= limits_of(testbed)[:, 0]).all()
 
 
 def test_a_machine_that_holds_every_moment_keeps_its_roll(general):

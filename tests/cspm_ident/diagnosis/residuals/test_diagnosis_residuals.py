@@ -7,17 +7,22 @@ import pytest
 from residual_samples import without_start, worst_sea
 from run_samples import SCENARIOS, bundle_of
 
+from cspm_ident.diagnosis.residuals.cable_and_bar import Suspension
 from cspm_ident.diagnosis.residuals.corrected_measurement import with_found
 from cspm_ident.diagnosis.residuals.drive_torque import sampled_constant, time_constant
+from cspm_ident.diagnosis.residuals.machine_signals import machine_signals
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.winch_torque import may_reverse
 from cspm_ident.signals.measurement import read_measurement
 from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.timeline import Timeline
+from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.testbed import EffectEntry, load_testbed
 from cspm_run.recorded_run import run
 from cspm_sim.effect_entries import Action, altered_testbed
 from cspm_sim.effects import Channel, catalogue
+from cspm_sim.effects.signals import FrameSignal
 
 THESIS = load_testbed(SCENARIOS / "testbeds" / "thesis.yaml")
 
@@ -63,6 +68,17 @@ def test_the_machine_itself_leaves_next_to_nothing(equations):
     for place, equation in equations.items():
         left = without_start(equation, equation.target)
         assert np.all(rms(left) < 0.01 * rms(equation.measured - equation.measured.mean(0))), place
+
+
+def test_cables_pull_the_frame_towards_the_bar(measurement):
+    (signals,) = machine_signals(Timeline(measurement))
+    here = Suspension(signals, measurement.machine, nominal_parameters(measurement.machine))
+    cables = range(len(measurement.machine.cables))
+    towards = FrameSignal.DIRECTION + np.arange(3)
+    pulls = sum(signals.tensions[:, i, None] * here.frame_rows(i)[:, towards] for i in cables)
+    force = here.frame_rows(0)[:, FrameSignal.FORCE + np.arange(3)]
+    np.testing.assert_allclose(force, pulls, atol=1e-9)
+    assert np.abs(force).max() > 10.0
 
 
 @pytest.mark.parametrize(

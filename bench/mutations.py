@@ -1,6 +1,7 @@
 """Whether tests notice a wrong sign, threshold or unit: `python -m bench.mutations [NAME …]`.
 
-Each mutation changes one line in a copy of the checkout and runs the tests that have to notice it.
+Each mutation changes one line in a copy of the checkout and runs the fast tests that have to notice
+it; their list is `bench/mutations.yaml`.
 A mutation that they let pass is a line that nothing holds.
 """
 
@@ -20,8 +21,11 @@ from rich.console import Console
 from rich.table import Table
 
 from cspm_msgs_py.new_folder import ScratchFolder
+from cspm_msgs_py.yaml_file import read_yaml
 
 ROOT = Path(__file__).resolve().parents[1]
+LIST = Path(__file__).with_suffix(".yaml")
+_QUICKLY = ("-q", "-x", "-p", "no:cacheprovider", "-m", "not slow")
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
 
 
@@ -43,78 +47,9 @@ class Mutation(NamedTuple):
     tests: str
 
 
-MUTATIONS = (
-    Mutation(
-        "sign: a cable's tension drives its winch",
-        "cspm_sim/kernels/winch.py",
-        "limited - cables[i, RADIUS] * tension",
-        "limited + cables[i, RADIUS] * tension",
-        "tests/cspm_sim/test_plant_winch.py",
-    ),
-    Mutation(
-        "sign: a moving frame lengthens its cables",
-        "cspm_model/kernels/kinematics.py",
-        "frame[i, 2] = -ux, -uy, -uz",
-        "frame[i, 2] = ux, uy, uz",
-        "tests/cspm_model/test_kinematics.py",
-    ),
-    Mutation(
-        "sign: the weight is pushed down, not held",
-        "cspm_control/controllers/motion_controller.py",
-        "out[2] -= weight",
-        "out[2] += weight",
-        "tests/cspm_control/controllers/test_motion_controller.py",
-    ),
-    Mutation(
-        "limit: angles are compared the longer way round",
-        "cspm_control/controllers/motion_controller.py",
-        "floor(angle / (2.0 * pi) + 0.5)",
-        "floor(angle / (2.0 * pi))",
-        "tests/cspm_control/controllers/test_motion_controller.py",
-    ),
-    Mutation(
-        "unit: revolutions per minute are taken per second",
-        "cspm_ident/importing/units.py",
-        '"rpm": _TURN / 60.0',
-        '"rpm": _TURN',
-        "tests/cspm_ident/importing/test_import_mapping.py",
-    ),
-    Mutation(
-        "unit: an input is stale after ms instead of s",
-        "cspm_control/safety.py",
-        "round(safety.stale_after * 1e9)",
-        "round(safety.stale_after * 1e6)",
-        "tests/cspm_control/test_safety.py",
-    ),
-    Mutation(
-        "sign: a sensor's sample arrives before it is taken",
-        "cspm_sim/sensors.py",
-        "(step + self.delay_steps, now_ns, sample)",
-        "(step - self.delay_steps, now_ns, sample)",
-        "tests/cspm_sim/test_sensors.py",
-    ),
-    Mutation(
-        "threshold: a colour's order costs nothing",
-        "cspm_ident/estimation/autoregression.py",
-        "np.log(variance) + 2.0 * order",
-        "np.log(variance) + 0.0 * order",
-        "tests/cspm_ident/estimation/test_autoregression.py",
-    ),
-    Mutation(
-        "threshold: chance counts as certain on what was held out",
-        "cspm_ident/diagnosis/validation/holdout_degradation.py",
-        "< -thresholds.certain_sigma * whole.error",
-        "< 0.0 * whole.error",
-        "tests/cspm_ident/diagnosis/validation/test_diagnosis_harm.py",
-    ),
-    Mutation(
-        "threshold: each candidate has all false alarms to itself",
-        "cspm_ident/diagnosis/regression/significance.py",
-        "/ (self._tried[effect.id] * len(self._tried))",
-        "/ len(self._tried)",
-        "tests/cspm_ident/diagnosis/regression/test_diagnosis_significance.py",
-    ),
-)
+def mutations() -> tuple[Mutation, ...]:
+    """Return those of `bench/mutations.yaml`."""
+    return tuple(Mutation(**each) for each in read_yaml(LIST))
 
 
 class Result(NamedTuple):
@@ -148,7 +83,7 @@ def try_mutation(copy: Path, mutation: Mutation) -> Result:
     file.write_text(mutated(before, mutation), encoding="utf-8")
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", mutation.tests],
+            [sys.executable, "-m", "pytest", *_QUICKLY, mutation.tests],
             cwd=copy,
             env=os.environ | {"PYTHONPATH": str(copy)},
             capture_output=True,
@@ -187,7 +122,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench.mutations", description=__doc__)
     parser.add_argument("words", nargs="*", metavar="WORD", help="of the names; otherwise all")
     words = parser.parse_args().words
-    chosen = [m for m in MUTATIONS if not words or any(word in m.name for word in words)]
+    chosen = [m for m in mutations() if not words or any(word in m.name for word in words)]
     with ScratchFolder("mutations") as place:
         copy_checkout(place)
         results = [try_mutation(place, mutation) for mutation in chosen]

@@ -1,23 +1,34 @@
 """Lines made wrong on purpose, and the tests that have to notice."""
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from bench.mutations import MUTATIONS, Mutation, mutated, try_mutation
+from bench.mutations import Mutation, mutated, mutations, try_mutation
 
 ROOT = Path(__file__).resolve().parents[2]
 DOUBLED = Mutation("sign", "sums.py", "return a + b", "return a - b", "test_sums.py")
 
 
-@pytest.mark.parametrize("mutation", MUTATIONS, ids=lambda m: m.name)
-def test_each_mutation_changes_one_line_and_has_its_tests(mutation):
-    before = (ROOT / mutation.file).read_text(encoding="utf-8")
-    after = mutated(before, mutation)
-    lines = list(zip(before.splitlines(), after.splitlines(), strict=True))
-    assert sum(one != other for one, other in lines) == 1
-    compile(after, mutation.file, "exec")
-    assert (ROOT / mutation.tests).is_file()
+def test_each_mutation_changes_one_line_and_has_its_tests():
+    for mutation in mutations():
+        before = (ROOT / mutation.file).read_text(encoding="utf-8")
+        after = mutated(before, mutation)
+        lines = list(zip(before.splitlines(), after.splitlines(), strict=True))
+        assert sum(one != other for one, other in lines) == 1, mutation.name
+        compile(after, mutation.file, "exec")
+        assert (ROOT / mutation.tests).is_file(), mutation.tests
+
+
+def test_sixty_lines_are_drawn_from_all_packages():
+    packages = Counter(each.file.split("/")[0] for each in mutations())
+    assert sum(packages.values()) >= 60
+    assert packages.keys() == {
+        *("cspm_msgs_py", "cspm_model", "cspm_sim", "cspm_control", "cspm_run"),
+        *("cspm_ident", "cspm_ros", "cspm", "bench"),
+    }
+    assert min(packages.values()) >= 3
 
 
 def test_text_that_is_not_there_once_is_refused():

@@ -2,8 +2,10 @@
 
 import pytest
 from machines import build, point_content
+from pydantic import TypeAdapter
 
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed_keys.plausible import Coordinate, DrumRadius
 
 FAULTS = [
     (("cables", 0, "stiffness", "youngs_modulus"), 60.0, "60 Pa, allowed: 100000 to 2e+12 Pa; 60"),
@@ -49,3 +51,8 @@ def test_without_a_likely_unit_none_is_proposed():
     with pytest.raises(InputError) as caught:
         build(changed(("cables", 0, "drum_radius"), 1.0e6))
     assert str(caught.value).endswith("1e+06 m, allowed: 0.0001 to 5 m")
+
+
+@pytest.mark.parametrize(("annotated", "least"), [(Coordinate, -600.0), (DrumRadius, 1e-4)])
+def test_the_schema_allows_both_signs_where_zero_is_allowed(annotated, least):
+    assert TypeAdapter(annotated).json_schema()["minimum"] == least

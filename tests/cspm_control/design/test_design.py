@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from schedules import delayed
 
 from cspm_control.design.force_gains import design_force_gains
 from cspm_control.design.gains import (
@@ -25,8 +26,11 @@ from cspm_model.linearisation import (
 from cspm_msgs_py.control_spec.force import ForceControl, PiGains
 from cspm_msgs_py.dofs import CONTROLLED_AXES, DOFS
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.scenario import MotionControl, PidGains
+from cspm_msgs_py.scenario import MotionControl, PidGains, load_scenario
+from cspm_msgs_py.schedule import BAR_POSE
 from cspm_msgs_py.testbed import Testbed, load_testbed
+from cspm_run.assembly import resolve
+from cspm_run.library import find_scenario
 from cspm_sim.parameters import plant_parameters
 
 TESTBEDS = Path(__file__).resolve().parents[3] / "scenarios" / "testbeds"
@@ -296,3 +300,13 @@ def test_another_machine(testbed):
     found = force_margins(testbed, parameters, CENTRE, force)
     assert all(value.bandwidth == pytest.approx(700.0) for value in found.values())
     check_separation(motion_margins(testbed, parameters, CENTRE, motion), found)
+
+
+def test_a_late_camera_gets_slower_motion_loops():
+    scenario = load_scenario(find_scenario("rest"))
+    prompt, late = (
+        resolve(scenario, machine).control.motion.gains
+        for machine in (THESIS, delayed(THESIS, {BAR_POSE: 5}))
+    )
+    assert prompt.keys() == late.keys() == set(CONTROLLED_DOFS)
+    assert all(late[dof].kp < 0.9 * prompt[dof].kp for dof in prompt)

@@ -40,6 +40,7 @@ NOT_RUN: dict[str, str] = {
     "cspm identify lengths": "needs the recording of `identify system`; tests/cspm_ident/lengths",
     "cspm diagnose today --held-out": "a minute; tests/cspm/cli/test_diagnose.py",
     "cspm diagnose monday tuesday": "a minute; tests/cspm/cli/test_diagnose.py",
+    "cspm migrate my_rig": "a file of the reader; tests/cspm_run/test_versions.py",
     "cspm merge my_rig.yaml": "of a verdict of the reader; tests/cspm_ident/test_merged_testbed.py",
     "cspm bundle": "of a verdict of the reader; tests/cspm/cli/test_bundle.py",
     "cspm run worst_case --testbed verdict": "needs that verdict; tests/project/test_tutorials.py",

@@ -89,7 +89,7 @@ def migrate(
     ],
     json: Json = None,
 ) -> None:
-    """Look whether a file of an older version is valid. Or name the key that has to be changed.
+    """Look whether an older file is valid. Or name the key that has to be changed.
 
     No version has renamed or dropped a key, so that files of all versions are valid as they are.
     """
@@ -127,7 +127,7 @@ def merge(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Take improved numbers over into your test-bed file. Comments and order stay.
+    """Merge improved numbers into your file. Comments and order stay.
 
     Every difference is shown, also those that you made since. The result says what IMPROVED says.
     """

@@ -243,7 +243,7 @@ def bundle(
     ] = None,
     json: Json = None,
 ) -> None:
-    """Pack what a colleague needs to repeat a verdict. Without names and paths.
+    """Pack what repeats a verdict. For a colleague, without names and paths.
 
     Recordings, test-bed, verdict and the command. Comments, notes and statuses are left out.
     """

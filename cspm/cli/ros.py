@@ -289,6 +289,7 @@ def mjcf(
         Path | None,
         typer.Option(metavar="FILE", help="A new file; without it to standard output."),
     ] = None,
+    json: Json = None,
 ) -> None:
     """Write winches as joints of MuJoCo. Armature, damping and friction loss, as identified.
 
@@ -297,4 +298,4 @@ def mjcf(
     """
     from cspm.commands.urdf_command import mjcf_command
 
-    mjcf_command(testbed, out)
+    mjcf_command(testbed, out, json)

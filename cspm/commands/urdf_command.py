@@ -7,9 +7,10 @@ from pathlib import Path
 import typer
 
 from cspm.testbed import load_testbed
-from cspm_model.scene.mujoco_joints import mujoco_joints
+from cspm_model.scene.mujoco_joints import joint_numbers, mujoco_joints
 from cspm_msgs_py.errors import InputError
 from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 
 
 def urdf_command(testbed: str, out: Path | None) -> None:
@@ -25,13 +26,22 @@ def urdf_command(testbed: str, out: Path | None) -> None:
     _hand_out(load_testbed(testbed).urdf(), out, "urdf")
 
 
-def mjcf_command(testbed: str, out: Path | None) -> None:
-    """Write a machine's winches as default classes of MuJoCo; arguments and errors as `cspm urdf`.
+def mjcf_command(testbed: str, out: Path | None, json: Path | None) -> None:
+    """Write a machine's winches as default classes of MuJoCo.
+
+    Args:
+        testbed: its name in the library, or its file.
+        out: a new file; None prints it, unless data are wanted instead.
+        json: file for the numbers of each joint as data; None writes none.
 
     Raises:
-        InputError: as above.
+        InputError: no such test-bed, or the file exists or cannot be written.
     """
-    _hand_out(mujoco_joints(load_testbed(testbed).description), out, "mjcf")
+    machine = load_testbed(testbed).description
+    if out is not None or json is None:
+        _hand_out(mujoco_joints(machine), out, "mjcf")
+    if json is not None:
+        write_json(json, {"joints": joint_numbers(machine)})
 
 
 def _hand_out(text: str, out: Path | None, kind: str) -> None:

@@ -27,17 +27,25 @@ def mujoco_joints(testbed: Testbed) -> str:
         own = ET.SubElement(defaults, "default", {"class": cable.name})
         for effect in _left_out(testbed, cable.name):
             own.append(ET.Comment(f" {effect}: left out, MuJoCo's joints have none "))
-        gear = cable.gear_ratio
-        inertia = cable.rotor_inertia + _sum(testbed, cable.name, _INERTIA, "inertia")
-        numbers = {
-            "armature": gear**2 * inertia,
-            "damping": gear**2 * _sum(testbed, cable.name, _VISCOUS, "coefficient"),
-            "frictionloss": gear * _sum(testbed, cable.name, _COULOMB, "torque"),
-        }
+        numbers = joint_numbers(testbed)[cable.name]
         ET.SubElement(own, "joint", {name: f"{value:.8g}" for name, value in numbers.items()})
         ET.SubElement(own, "motor", _motor(cable))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def joint_numbers(testbed: Testbed) -> dict[str, dict[str, float]]:
+    """Return armature, damping and frictionloss of each winch behind its gear, by cable."""
+    found = {}
+    for cable in testbed.cables:
+        gear = cable.gear_ratio
+        inertia = cable.rotor_inertia + _sum(testbed, cable.name, _INERTIA, "inertia")
+        found[cable.name] = {
+            "armature": gear**2 * inertia,
+            "damping": gear**2 * _sum(testbed, cable.name, _VISCOUS, "coefficient"),
+            "frictionloss": gear * _sum(testbed, cable.name, _COULOMB, "torque"),
+        }
+    return found
 
 
 def _motor(cable: Cable) -> dict[str, str]:

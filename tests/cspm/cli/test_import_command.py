@@ -135,7 +135,11 @@ def test_what_cannot_be_done_is_one_line_and_leaves_nothing(lab, tmp_path):
         (["--out", "there"], {}, "there: already exists, allowed: a new folder"),
         (["--out", "b", "--dry-run"], {}, "--out b --dry-run: allowed: one of both"),
         (["--out", "b"], {"source": "no.csv"}, "no.csv: no such file, allowed: a text table"),
-        (["--out", "b"], {"mapping": "lab"}, "lab: no such mapping, allowed: emps or a file"),
+        (
+            ["--out", "b"],
+            {"mapping": "lab"},
+            "lab: no such mapping, allowed: bam, emps, joint_log or a file",
+        ),
         (["--out", "b"], {"mapping": "no.yaml"}, "no.yaml: no such file, allowed: a mapping file"),
         (
             ["--out", "b"],

@@ -1,11 +1,12 @@
 """The command `cspm urdf`: one document on standard output, in a file and in Python."""
 
+import json
 import re
 
 import pytest
 
 import cspm
-from cspm.commands.urdf_command import urdf_command
+from cspm.commands.urdf_command import mjcf_command, urdf_command
 from cspm_msgs_py.errors import InputError
 
 
@@ -35,3 +36,13 @@ def test_what_cannot_be_written_or_read_is_said(tmp_path):
         urdf_command("thesis", away)
     with pytest.raises(InputError, match=r"^no_robot: no such test-bed"):
         urdf_command("no_robot", None)
+
+
+def test_winches_are_printed_or_written_for_mujoco_and_their_numbers_as_data(tmp_path, capsys):
+    mjcf_command("emps", None, None)
+    text = capsys.readouterr().out
+    assert '<default class="carriage">' in text
+    mjcf_command("emps", tmp_path / "joints.xml", tmp_path / "joints.json")
+    assert (tmp_path / "joints.xml").read_text(encoding="utf-8") == text
+    (joint,) = json.loads((tmp_path / "joints.json").read_text())["joints"].values()
+    assert joint == {"armature": 9.51089e-3, "damping": 2.035034e-2, "frictionloss": 0.203935}

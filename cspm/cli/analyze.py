@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import MARKUP, Json, app
+from cspm.cli.early_checks import check_analysed
 
 analyze = typer.Typer(
     no_args_is_help=True,
@@ -63,6 +64,7 @@ def linear(
 
     Once with cable directions held, as the thesis does, and once exactly.
     """
+    check_analysed(scenario, testbed, out)
     from cspm.commands.analysis.analyze_linear_command import analyze_linear_command
     from cspm.commands.analysis.analyzed_machine import read_machine
 
@@ -110,6 +112,7 @@ def workspace(
     Beyond: tensions from their lowest limit, room for an acceleration, conditioning,
     manipulability.
     """
+    check_analysed(scenario, testbed, out)
     from cspm.commands.analysis.analyze_workspace_command import analyze_workspace_command
     from cspm.commands.analysis.analyzed_machine import read_acceleration, read_machine
 
@@ -138,6 +141,7 @@ def manipulability(
 
     And what acceleration gravity and the cables' limits leave in each DOF.
     """
+    check_analysed(scenario, testbed, out)
     from cspm.commands.analysis.analyze_manipulability_command import analyze_manipulability_command
     from cspm.commands.analysis.analyzed_machine import read_machine
 
@@ -169,6 +173,7 @@ def reference(
 
     As if bar and cables followed it exactly; the picture shades where no tensions will do.
     """
+    check_analysed(scenario, testbed, out)
     from cspm.commands.analysis.analyze_reference_command import analyze_reference_command
     from cspm_run.library import find_scenario
 
@@ -202,6 +207,7 @@ def sag(
 
     Beside the tensions of straight cables without weight, which controllers assume.
     """
+    check_analysed(scenario, testbed)
     from cspm.commands.analysis.analyze_sag_command import analyze_sag_command
     from cspm.commands.analysis.analyzed_machine import read_machine
 
@@ -242,6 +248,7 @@ def design(
     Gains that the scenario does not give are designed first, at its design pose; the loops are
     looked at where --pose says.
     """
+    check_analysed(scenario, testbed, out)
     from cspm.commands.analysis.analyze_design_command import analyze_design_command
     from cspm.commands.analysis.analyzed_machine import read_machine
 

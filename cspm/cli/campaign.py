@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import RUN_FAILED, Json, app
+from cspm_msgs_py.yaml_file import read_text
 
 
 @app.command(
@@ -78,6 +79,7 @@ def campaign(
     The folder gets runs.parquet, one row a run, and campaign.html. The same command goes on where
     it was interrupted.
     """
+    read_text(file)
     from cspm.commands.campaign_command import CampaignRequest, campaign_command, list_command
 
     if listed:

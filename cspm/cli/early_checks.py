@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import refuse_existing
-from cspm_run.library import find_testbed
+from cspm_run.library import find_scenario, find_testbed
 
 SEARCHED, FITTED, HELD_OUT = "searched", "fitted", "held out"
 SPLIT = "searched, its last three tenths held out"
@@ -41,6 +41,16 @@ def begin_judged(
     for path in held_out:
         say(console, f"{HELD_OUT}: {path}")
     check_given([*recordings, *held_out], testbed)
+
+
+def check_analysed(scenario: str, testbed: str | Path | None, out: Path | None = None) -> None:
+    """Refuse scenarios and test-beds that are not there, and a folder that is.
+
+    Raises:
+        InputError: naming what is missing, with the library, or already exists.
+    """
+    find_scenario(scenario)
+    check_given((), None if testbed is None else Path(testbed), out)
 
 
 def check_given(

@@ -77,6 +77,7 @@ def resim(
 
     Bit for bit, in every field. Otherwise the first difference is printed: topic, message, field.
     """
+    check_given([bag])
     from cspm.commands.run_command import resim_command
 
     raise typer.Exit(0 if resim_command(bag, json, controllers or ()) else RUN_FAILED)
@@ -209,6 +210,7 @@ def export(
 
     Nothing is interpolated: a row for each stamp, and nothing where a signal has none then.
     """
+    check_given([bag])
     from cspm.commands.recordings.export_command import export_command
 
     names = [] if signals is None else [name.strip() for name in signals.split(",")]
@@ -247,6 +249,7 @@ def bundle(
 
     Recordings, test-bed, verdict and the command. Comments, notes and statuses are left out.
     """
+    check_given([*recordings, verdict], testbed)
     from cspm.commands.recordings.bundle_command import bundle_command
 
     bundle_command(recordings, verdict, out, testbed, json)

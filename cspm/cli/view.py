@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import Json, app
+from cspm.cli.early_checks import check_given
 from cspm.cli.shared_options import Browser, Port
 
 Host = Annotated[
@@ -68,6 +69,7 @@ def view(
 
     Serves a page to browsers on this computer, or writes it as one file.
     """
+    check_given(recordings, testbed)
     from cspm.commands.view_command import ViewRequest, view_command
 
     opened = sys.stdout.isatty() if browser is None else browser

@@ -1,7 +1,8 @@
 """Say which of some modules each step loads that none before it did.
 
 `python loaded_child.py WATCHED ... < STEPS`: a step is a module's name, or the words of a command,
-as JSON. What each step has loaded in addition goes to standard output, as JSON too.
+under `refused` where it has to refuse them, as JSON. What each step has loaded in addition goes to
+standard output, as JSON too.
 """
 
 import contextlib
@@ -13,16 +14,17 @@ import cspm.cli.main as cli
 
 
 def take(step):
-    """Import a module, or run a command, whose exit code has to be 0."""
+    """Import a module, or run a command, whose exit code has to be 0, or 2 where it refuses."""
     if isinstance(step, str):
         importlib.import_module(step)
         return
-    sys.argv = ["cspm", *step]
+    refused = isinstance(step, dict)
+    sys.argv = ["cspm", *(step["refused"] if refused else step)]
     try:
         with contextlib.redirect_stdout(sys.stderr):
             cli.main()
     except SystemExit as end:
-        if end.code:
+        if (end.code or 0) != (2 if refused else 0):
             raise
 
 

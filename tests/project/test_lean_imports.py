@@ -82,3 +82,12 @@ def test_whole_commands_load_no_more_than_they_use(tmp_path):
     }
     found = newly_loaded([each.split() for each in expected], tmp_path)
     assert dict(zip(expected, found, strict=True)) == expected
+
+
+def test_what_is_not_there_is_refused_before_anything_large_is_loaded(tmp_path):
+    words = (
+        *("diagnose", "compare", "identify winch", "identify system", "identify stiffness"),
+        *("identify lengths", "export --out a.csv", "resim", "analyze workspace", "campaign"),
+    )
+    found = newly_loaded([{"refused": [*each.split(), "nowhere"]} for each in words], tmp_path)
+    assert dict(zip(words, found, strict=True)) == {each: [] for each in words}

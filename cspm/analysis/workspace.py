@@ -19,6 +19,7 @@ from cspm_control.analysis.claim import Claim
 from cspm_control.analysis.pose_grid import Grid, workspace_grids
 from cspm_control.analysis.published_workspace import workspace_claims
 from cspm_control.analysis.workspace import ALGORITHMS
+from cspm_control.analysis.workspace_limits import LIMITED
 from cspm_control.analysis.workspace_result import (
     ACCELERATED,
     FEASIBLE,
@@ -26,8 +27,10 @@ from cspm_control.analysis.workspace_result import (
     analyse_workspace,
 )
 from cspm_control.waves.build import build_motion
-from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.new_folder import new_folder
+from cspm_run.assembly import resolve
+from cspm_run.stability.stable_region import stable_limits
 
 PICTURES = ("workspace.png", "maps.png")
 
@@ -41,12 +44,15 @@ class Workspace:
         result: limits per DOF, whole grids, maps, internal.
         coarse: every so-manieth value of each DOF of the whole grids was taken.
         claims: the thesis's figures beside ours, where they are of this machine at this pose.
+        stable: how far each DOF goes alone until the scenario's gains, fixed, are not stable
+            together [m, rad]; None: not even here, or no loops that can be followed.
     """
 
     machine: AnalyzedMachine
     result: WorkspaceResult
     coarse: int
     claims: tuple[Claim, ...]
+    stable: dict[str, float | None]
 
     @property
     def limits(self) -> dict[str, dict[str, float | None]]:
@@ -59,7 +65,8 @@ class Workspace:
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data: what `cspm analyze workspace --json` writes."""
-        return _data(self.machine, self.result, self.claims, self.coarse)
+        found = _data(self.machine, self.result, self.claims, self.coarse)
+        return found | {"limits_stable": self.stable}
 
     def write(self, folder: str | Path) -> tuple[Path, ...]:
         """Draw the workspace and maps over it; return the pictures' paths.
@@ -141,7 +148,16 @@ def workspace_of(
     if found is None:
         return None
     claims = workspace_claims(found) if machine.is_published else []
-    return Workspace(machine, found, coarse, tuple(claims))
+    return Workspace(machine, found, coarse, tuple(claims), _stable_limits(machine))
+
+
+def _stable_limits(machine: AnalyzedMachine) -> dict[str, float | None]:
+    """Return how far each DOF goes alone with the scenario's gains; none where it has no gains."""
+    try:
+        designed = resolve(machine.scenario, machine.testbed, machine.folder)
+    except CspmError:
+        return dict.fromkeys(LIMITED)
+    return stable_limits(designed, machine.testbed, grids_of(machine)["general"], machine.pose)
 
 
 def reference_acceleration(machine: AnalyzedMachine) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cspm.analysis.machine import AnalyzedMachine
-from cspm.analysis.workspace import grids_of, workspace_of
+from cspm.analysis.workspace import Workspace, grids_of, workspace_of
 from cspm.commands.analysis.claim_table import claim_table
 from cspm.commands.progress_shown import shown
 from cspm_control.analysis.claim import Claim
@@ -66,6 +66,7 @@ def analyze_workspace_command(
     if found is None:
         raise typer.Abort
     _show(console, found.result, found.claims)
+    say(console, _stable_line(found))
     if folder is not None:
         say(console, f"written {', '.join(map(str, found.write(folder)))}")
     if json is not None:
@@ -115,6 +116,19 @@ def _show(console: Console, found: WorkspaceResult, claims: Sequence[Claim]) -> 
         say(console, f"largest κ over the general workspace, {kind}: {value:.5g}")
     if claims:
         console.print(claim_table("the thesis's tables 6-1 and 6-2", claims, {OURS: "ours"}))
+
+
+def _stable_line(found: Workspace) -> str:
+    """Return how far the bar goes until gains that stay what they are are not stable."""
+    ends = found.result.whole["general"].ends
+    reach = [
+        f"{dof} {_limit(value, UNITS[dof], ends.get(dof))}"
+        for dof, value in found.stable.items()
+        if dof in ends
+    ]
+    if all(value is None for value in found.stable.values()):
+        return "fixed gains: no loops that can be followed, or none that are stable at this pose"
+    return f"fixed gains are stable, one DOF alone: {', '.join(reach)}"
 
 
 def _limit_table(title: str, found: WorkspaceResult) -> Table:

@@ -78,12 +78,53 @@ def _lacks_gains(motion: object) -> bool:
 
 @lru_cache(maxsize=_KEPT)
 def _designed(question: _Question) -> ClosedLoop:
+    """Return the control with its gains.
+
+    Where a file gives none, and those of fast force loops are not stable together or leave the
+    motion none, force loops are slow.
+
+    Raises:
+        InputError: no gains meet what is asked for.
+    """
+    known = question.scenario, question.testbed
+    try:
+        fast = _with_designed(question, slow=False)
+    except InputError:
+        if not _is_open(question.control):
+            raise
+        return _with_designed(question, slow=True)
+    if not _is_open(question.control) or not _grows(fast, *known):
+        return fast
+    try:
+        slow = _with_designed(question, slow=True)
+    except InputError:
+        return fast
+    return fast if _grows(slow, *known) else slow
+
+
+def _is_open(control: ClosedLoop) -> bool:
+    """Return whether a file leaves all gains to be designed, of motion and force loops."""
+    motion = control.motion
+    if not isinstance(motion, MotionControl):
+        return False
+    return not (control.force.gains or motion.gains or motion.crossover)
+
+
+def _grows(control: ClosedLoop, scenario: Scenario, testbed: Testbed) -> bool:
+    """Return whether all loops together are known not to be stable at the design pose."""
+    designed = scenario.model_copy(update={"control": control, "controllers": {}})
+    found = loop_growth(designed, testbed)
+    return found is not None and found.unstable
+
+
+def _with_designed(question: _Question, *, slow: bool) -> ClosedLoop:
+    """Return the control with its gains; `slow` keeps force loops below their resonances."""
     control, scenario, testbed = question.control, question.scenario, question.testbed
     parameters = nominal_parameters(testbed)
     motion, force = control.motion, control.force
     pose = motion.design_pose
     force_gains = force.gains or design_force_gains(
-        testbed, parameters, pose, force.bandwidth, _force_dead_time(scenario, testbed)
+        testbed, parameters, pose, force.bandwidth, _force_dead_time(scenario, testbed), slow=slow
     )
     control = control.model_copy(update={"force": force.model_copy(update={"gains": force_gains})})
     if isinstance(motion, MotionControl) and _lacks_gains(motion):
@@ -178,9 +219,7 @@ def _unstable(
     """Return whether motion gains are known not to be stable at the design pose."""
     motion = control.motion.model_copy(update={"gains": gains})
     control = control.model_copy(update={"motion": motion})
-    designed = scenario.model_copy(update={"control": control, "controllers": {}})
-    found = loop_growth(designed, testbed)
-    return found is not None and found.unstable
+    return _grows(control, scenario, testbed)
 
 
 def _times(factor: float, pid: PidGains) -> PidGains:

@@ -9,6 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cspm_model.linearisation import operating_point
+from cspm_model.parameters import nominal_parameters
+from cspm_msgs_py.errors import CspmError
+from cspm_msgs_py.testbed import parse_testbed
+
 Array = NDArray[np.float64]
 
 GRAVITY = 9.81
@@ -36,8 +41,22 @@ class DrawnMachine(NamedTuple):
 
 
 def drawn_machine(seed: int) -> DrawnMachine:
-    """Return the machine of a seed: geometry, gears, ropes, pulleys and parts are all drawn."""
+    """Return the machine of a seed: geometry, gears, ropes, pulleys and parts are all drawn.
+
+    It is drawn again until its cables hold the body in the middle.
+    """
     rng = np.random.default_rng(seed)
+    while True:
+        drawn = _drawn(rng, f"drawn_{seed}")
+        testbed = parse_testbed(json.dumps(drawn.testbed), "drawn").testbed
+        try:
+            operating_point(testbed, nominal_parameters(testbed), np.zeros(6))
+            return drawn
+        except CspmError:
+            continue
+
+
+def _drawn(rng: np.random.Generator, name: str) -> DrawnMachine:
     count = int(rng.integers(3, 10))
     size, mass = float(rng.uniform(1.0, 6.0)), float(np.exp(rng.uniform(np.log(0.1), np.log(500))))
     height, platform = size * float(rng.uniform(0.7, 1.5)), size * float(rng.uniform(0.08, 0.2))
@@ -46,7 +65,7 @@ def drawn_machine(seed: int) -> DrawnMachine:
     exits, ends = _geometry(rng, count, size, height, platform)
     share = mass * GRAVITY / min(count, 4)
     own = _winch(rng, mass, share, count, size)
-    name = f"drawn_{seed}"
+    friction = {"torque": 0.01 * own["torque_limit"]}
     testbed = {
         "name": name,
         "bar": _body(mass, max(platform, 0.05 * size)),
@@ -55,12 +74,7 @@ def drawn_machine(seed: int) -> DrawnMachine:
             for i, (exit_, end) in enumerate(zip(exits.tolist(), ends.tolist(), strict=True))
         ],
         "sensors": _sensors(share, own),
-        "effects": [
-            {
-                "effect": "winch_coulomb_friction",
-                "parameters": {"torque": 0.01 * own["torque_limit"]},
-            }
-        ],
+        "effects": [{"effect": "winch_coulomb_friction", "parameters": friction}],
     }
     return DrawnMachine(testbed, _scenario(name, size, rng), size)
 

@@ -1,10 +1,9 @@
 """Force loops of cables so stiff that no drive gives the bandwidth that is wanted.
 
-A steel cable's resonance is little damped, and the time that sampling takes leaves no phase above
-it. What is left is to stay below: the gain at the resonance is kept under what 6 dB of margin
-leave, and the torque that balances the wanted tension goes ahead (Åström, Hägglund, Advanced PID
-Control, 2006, section 3.4), so that the loop only corrects it. Motion loops then see the winches'
-inertia, and are designed on it.
+A steel cable's resonance is little damped, and the time that sampling takes leaves little phase
+above it. Where a loop above keeps no margins it stays below: it only integrates, slower than any
+motion loop, and the torque that balances the wanted tension goes ahead (Åström, Hägglund, Advanced
+PID Control, 2006, section 3.4). Motion loops then see the winches' inertia, and are designed on it.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cspm_control.design.margins import ComplexArray, Margins, grid_margins
+from cspm_control.design.margins import ComplexArray, grid_margins
 from cspm_model.kernels.cable import RADIUS
 from cspm_model.kernels.machine import BAR_STATES, PlantParameters
 from cspm_model.linearisation import (
@@ -26,17 +25,13 @@ from cspm_model.linearisation import (
     wrench_tensions,
 )
 from cspm_msgs_py.control_spec.force import PiGains
-from cspm_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Gains are looked for as tension fed back per tension, above the resonance; below it as shares of
-# what gives the bandwidth.
-GAINS, LOWERED = np.geomspace(1000.0, 0.1, 121), np.geomspace(1.0, 1e-3, 10)
-# Integral frequencies above the resonance, as shares of the largest bandwidth.
-INTEGRAL_SHARES = (1.0 / 20.0, 1.0 / 40.0, 1.0 / 80.0)
-# Below the resonance a loop only integrates: with the phase that its samples lose less than 1°, it
-# has no proportional term to speak of.
+# Gains above the resonance are looked for as tension fed back per tension, integral frequencies as
+# shares of the largest bandwidth.
+GAINS, INTEGRAL_SHARES = np.geomspace(1000.0, 0.1, 121), (1.0 / 20.0, 1.0 / 40.0, 1.0 / 80.0)
+# Below it a loop only integrates: beside this frequency a proportional term is nothing.
 INTEGRAL_FREQUENCY = 1000.0  # rad/s
 
 
@@ -48,61 +43,56 @@ class DriveLimit(NamedTuple):
         gain_margin: [dB].
         largest_bandwidth: of the closed loop [rad/s].
         slow_bandwidth: the largest of a loop below the resonance [rad/s].
+        ratio: how many times slower than the motion loop it is at least.
     """
 
     phase_margin: float
     gain_margin: float
     largest_bandwidth: float
     slow_bandwidth: float
+    ratio: float
 
 
-def drive_limited_gains(
-    name: str, frequencies: Array, response: ComplexArray, radius: float, limit: DriveLimit
-) -> PiGains:
-    """Return the PI of a stiff cable within a limit.
-
-    Of largest bandwidth above the resonance if the drive allows any, else below it, with the torque
-    of the wanted tension ahead.
+def fast_gains(
+    frequencies: Array, response: ComplexArray, radius: float, resonance: float, limit: DriveLimit
+) -> PiGains | None:
+    """Return the PI of largest bandwidth above the resonances that keeps a limit, None without any.
 
     Args:
-        name: of the cable, for errors.
         frequencies: rising (m,) [rad/s].
         response: from motor torque to tension there, with all that delays it, (m,) [N/(N·m)].
         radius: cable wound per radian of the motor [m].
+        resonance: the fastest of the machine [rad/s].
         limit: what to keep.
-
-    Raises:
-        InputError: no PI keeps it.
     """
-    tensions = radius * response
-    resonance = float(frequencies[int(np.abs(tensions).argmax())])
     for share in INTEGRAL_SHARES:
         integral = share * limit.largest_bandwidth
-        shape = (1.0 + integral / (1j * frequencies)) * tensions
+        shape = radius * (1.0 + integral / (1j * frequencies)) * response
         for gain in GAINS:
             kept = grid_margins(frequencies, gain * shape)
-            slowest = min(kept.crossover, kept.bandwidth)
-            wide = resonance < slowest and kept.bandwidth <= limit.largest_bandwidth
-            if wide and _is_kept(kept, limit):
+            if (
+                resonance < min(kept.crossover, kept.bandwidth)
+                and kept.bandwidth <= limit.largest_bandwidth
+                and kept.phase_margin >= limit.phase_margin
+                and kept.gain_margin >= limit.gain_margin
+                and not np.isfinite(kept.low_frequency_gain)
+            ):
                 return PiGains(kp=radius * float(gain), integral_frequency=integral)
-    shape = (1.0 + INTEGRAL_FREQUENCY / (1j * frequencies)) * tensions
-    largest = limit.slow_bandwidth / (INTEGRAL_FREQUENCY * float(np.abs(tensions[0])))
-    for gain in largest * LOWERED:
-        if _is_kept(grid_margins(frequencies, gain * shape), limit):
-            kp = radius * float(gain)
-            return PiGains(kp=kp, integral_frequency=INTEGRAL_FREQUENCY, feedforward=1.0)
-    raise InputError(
-        f"control.force: no PI of {name} keeps {np.degrees(limit.phase_margin):.0f}° and"
-        f" {limit.gain_margin:g} dB of margins, allowed: control.force.gains"
-    )
+    return None
 
 
-def _is_kept(found: Margins, limit: DriveLimit) -> bool:
-    return (
-        found.phase_margin >= limit.phase_margin
-        and found.gain_margin >= limit.gain_margin
-        and not np.isfinite(found.low_frequency_gain)
-    )
+def slow_gains(frequencies: Array, response: ComplexArray, limit: DriveLimit) -> PiGains:
+    """Return the PI below the resonance, with the torque of the wanted tension ahead.
+
+    Its gain margin leaves a motion loop a crossover at which the resonance reaches half of |L| = 1;
+    the force loop is slower than that by the limit's ratio. Arguments as `fast_gains`.
+    """
+    magnitude = np.abs(response)
+    highest = int(magnitude.argmax())
+    reach = 0.5 * frequencies[highest] * magnitude[0] / magnitude[highest]
+    bandwidth = min(limit.slow_bandwidth, float(reach) / limit.ratio)
+    kp = bandwidth / (INTEGRAL_FREQUENCY * float(magnitude[0]))
+    return PiGains(kp=kp, integral_frequency=INTEGRAL_FREQUENCY, feedforward=1.0)
 
 
 def motion_plant_of_slow_loops(

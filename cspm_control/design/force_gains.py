@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cspm_control.design.drive_limited import DriveLimit, drive_limited_gains
+from cspm_control.design.drive_limited import DriveLimit, fast_gains, slow_gains
 from cspm_control.design.gains import (
     BANDWIDTH_RATIO,
     GAIN_MARGIN,
@@ -42,7 +42,9 @@ LEAST_PHASE_MARGIN = np.radians(30.0)
 LARGEST_INTEGRAL_SHARE = 1.0 / 20.0
 # A force loop below its cable's resonance is as much slower than the motion as one above is faster.
 SLOW_FORCE_BANDWIDTH = MOTION_BANDWIDTH / BANDWIDTH_RATIO
-DRIVE_LIMIT = DriveLimit(LEAST_PHASE_MARGIN, GAIN_MARGIN, FORCE_BANDWIDTH, SLOW_FORCE_BANDWIDTH)
+DRIVE_LIMIT = DriveLimit(
+    LEAST_PHASE_MARGIN, GAIN_MARGIN, FORCE_BANDWIDTH, SLOW_FORCE_BANDWIDTH, BANDWIDTH_RATIO
+)
 
 
 def design_force_gains(
@@ -51,6 +53,8 @@ def design_force_gains(
     design_pose: ArrayLike,
     bandwidth: float | dict[str, float],
     dead_time: float = 0.0,
+    *,
+    slow: bool = False,
 ) -> dict[str, PiGains]:
     """Return the PI per cable whose closed loop has −3 dB at its bandwidth, section 7-2.
 
@@ -64,6 +68,7 @@ def design_force_gains(
         bandwidth: one for all cables, or by name or kind of cable [rad/s]; a cable that is not
             named has the default.
         dead_time: what sampling and sensors delay a drive-limited loop by [s].
+        slow: keep the loops whose bandwidth is the default below the resonances.
 
     Raises:
         InputError: the machine has no bar or no such cable, a bandwidth is above the thesis's
@@ -71,16 +76,9 @@ def design_force_gains(
         ConvergenceError: the bar cannot hang at the design pose.
     """
     names = testbed.cable_names
-    bandwidths = values_per_cable(bandwidth, names, FORCE_BANDWIDTH, BANDWIDTH_KEY)
-    for name, wanted in zip(names, bandwidths, strict=True):
-        if not 0.0 < wanted <= LARGEST_FORCE_BANDWIDTH:
-            whose = f" of {name}" if isinstance(bandwidth, dict) else ""
-            raise InputError(
-                f"{BANDWIDTH_KEY}: {wanted:g} rad/s{whose}, allowed: above 0 and at most"
-                f" {LARGEST_FORCE_BANDWIDTH:g} rad/s"
-            )
+    bandwidths = _bandwidths(names, bandwidth)
     model = tension_plant(testbed, parameters, design_pose)
-    plants = {wanted: _grid_response(model, wanted) for wanted in set(bandwidths)}
+    plants = {each: _grid_response(model, each) for each in set(bandwidths)}
     found = {}
     for i, name in enumerate(names):
         plant, grid = plants[bandwidths[i]]
@@ -89,10 +87,66 @@ def design_force_gains(
         except InputError:
             if bandwidths[i] != FORCE_BANDWIDTH:
                 raise
-            delayed = plant.response(grid)[:, i, i] * np.exp(-1j * grid * dead_time)
-            radius = float(parameters.cables[i, RADIUS])
-            found[name] = drive_limited_gains(name, grid, delayed, radius, DRIVE_LIMIT)
-    return found
+    left = {name: i for i, name in enumerate(names) if bandwidths[i] == FORCE_BANDWIDTH}
+    if not left or (len(found) == len(names) and not slow):
+        return found
+    plant, grid = plants[FORCE_BANDWIDTH]
+    response = plant.response(grid) * np.exp(-1j * grid * dead_time)[:, None, None]
+    limited = None
+    if not slow:
+        limited = _fast(model, grid, response, parameters.cables[:, RADIUS], left, found)
+    if limited is None:
+        limited = {n: slow_gains(grid, response[:, i, i], DRIVE_LIMIT) for n, i in left.items()}
+    return {name: limited.get(name) or found[name] for name in names}
+
+
+def _bandwidths(names: tuple[str, ...], bandwidth: float | dict[str, float]) -> list[float]:
+    """Return the bandwidth of each cable [rad/s].
+
+    Raises:
+        InputError: one is above the thesis's limit.
+    """
+    found = values_per_cable(bandwidth, names, FORCE_BANDWIDTH, BANDWIDTH_KEY)
+    for name, wanted in zip(names, found, strict=True):
+        if not 0.0 < wanted <= LARGEST_FORCE_BANDWIDTH:
+            whose = f" of {name}" if isinstance(bandwidth, dict) else ""
+            raise InputError(
+                f"{BANDWIDTH_KEY}: {wanted:g} rad/s{whose}, allowed: above 0 and at most"
+                f" {LARGEST_FORCE_BANDWIDTH:g} rad/s"
+            )
+    return list(found)
+
+
+def _fast(
+    model: StateSpace,
+    frequencies: Array,
+    response: ComplexArray,
+    radii: Array,
+    left: dict[str, int],
+    found: dict[str, PiGains],
+) -> dict[str, PiGains] | None:
+    """Return gains above the resonances; None where a cable has none.
+
+    One slow loop slows the motion: then no loop is fast that nobody asked to be.
+
+    Args:
+        model: from torques to tensions.
+        frequencies: rising (m,) [rad/s].
+        response: of all torques to all tensions there, delayed, (m, n, n).
+        radii: cable wound per radian of each motor, (n,) [m].
+        left: the cables whose bandwidth nobody asked for, by number.
+        found: the gains of those that it suits.
+    """
+    resonance = float(np.abs(np.linalg.eigvals(model.A)).max())
+    gains = {}
+    for name, i in left.items():
+        own = found.get(name) or fast_gains(
+            frequencies, response[:, i, i], float(radii[i]), resonance, DRIVE_LIMIT
+        )
+        if own is None:
+            return None
+        gains[name] = own
+    return gains
 
 
 def _grid_response(model: StateSpace, bandwidth: float) -> tuple[GridResponse, Array]:

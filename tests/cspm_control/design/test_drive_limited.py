@@ -8,7 +8,7 @@ import yaml
 from steel_hoist import DRUM, GEAR, MASS, MIDDLE, ROTOR, hoist, hoist_content, hoist_scenario
 
 import cspm
-from cspm_control.design.drive_limited import DriveLimit, drive_limited_gains
+from cspm_control.design.drive_limited import DriveLimit, fast_gains, slow_gains
 from cspm_control.design.force_gains import SLOW_FORCE_BANDWIDTH, design_force_gains
 from cspm_control.design.gains import force_loop, motion_plant, tension_plant
 from cspm_control.design.margins import loop_frequencies, margins
@@ -16,6 +16,7 @@ from cspm_model.linearisation import operating_point
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario import parse_scenario
+from cspm_msgs_py.testbed import parse_testbed
 from cspm_run.assembly import resolve
 from cspm_run.stability.loop_growth import loop_growth
 
@@ -63,11 +64,28 @@ def test_a_bandwidth_that_is_asked_for_is_kept_or_refused():
         design_force_gains(testbed, parameters, MIDDLE, 700.0)
 
 
-def test_a_resonance_without_damping_has_no_loop():
-    frequencies = np.geomspace(1.0, 1000.0, 2000)
-    free = 1.0 / (1.0 - (frequencies / 100.0) ** 2 + 1e-12j)
-    with pytest.raises(InputError, match=r"no PI of h1 keeps 30° and 6 dB of margins"):
-        drive_limited_gains("h1", frequencies, free, 1.0, DriveLimit(np.pi / 6, 6.0, 800.0, 1e4))
+def test_a_resonance_that_is_hardly_damped_leaves_a_slower_loop_below_it_and_none_above():
+    frequencies = np.geomspace(0.1, 1000.0, 4000)
+    limit = DriveLimit(np.pi / 6, 6.0, 800.0, 0.73, 10.0)
+    gains = {}
+    for damping in (0.3, 0.003):
+        s = 1j * frequencies / 100.0
+        response = (1.0 + 0.2 * damping * s) / (1.0 + 2.0 * damping * s + s**2)
+        gains[damping] = slow_gains(frequencies, response, limit)
+    assert fast_gains(frequencies, response, 1.0, 100.0, limit) is None
+    assert gains[0.3].kp * gains[0.3].integral_frequency == pytest.approx(0.73, rel=0.01)
+    # The resonance is 1/(2·0.003) high.
+    slower = 0.1 * 0.5 * 100.0 * 0.006
+    assert gains[0.003].kp * gains[0.003].integral_frequency == pytest.approx(slower, rel=0.02)
+
+
+def test_one_slow_loop_slows_those_that_nobody_asked_to_be_fast():
+    content = hoist_content(THIN)
+    content["cables"][0]["stiffness"]["diameter"] = THICK
+    content["cables"][0]["damping"]["constant"] = 20.0
+    testbed = parse_testbed(json.dumps(content), "mixed").testbed
+    gains = design_force_gains(testbed, nominal_parameters(testbed), MIDDLE, 800.0, HELD)
+    assert [each.feedforward for each in gains.values()] == [1.0, 1.0, 1.0]
 
 
 def test_the_motion_loops_see_the_inertia_of_the_winches():

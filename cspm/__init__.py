@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from cspm.diagnosis import diagnose as diagnose
     from cspm.identification.cables import identify_damping as identify_damping
     from cspm.identification.cables import identify_stiffness as identify_stiffness
+    from cspm.identification.geometry import identify_geometry as identify_geometry
     from cspm.identification.identified import Identification as Identification
     from cspm.identification.system import identify_system as identify_system
     from cspm.identification.winches import identify_winch as identify_winch
@@ -74,6 +75,7 @@ _PLACES = {
     "effects": "cspm.catalogue",
     "identify_damping": "cspm.identification.cables",
     "identify_stiffness": "cspm.identification.cables",
+    "identify_geometry": "cspm.identification.geometry",
     "identify_system": "cspm.identification.system",
     "identify_winch": "cspm.identification.winches",
     "import_recording": "cspm.importing",

@@ -270,21 +270,22 @@ def winch(
     _end(identify_winch_command(request, json))
 
 
-@identify.command(
-    cls=JudgedCommand,
-    epilog="""Example:
+_GEOMETRY_EXAMPLE = """Example:
 
-cspm run calm --out calm_60s
+cspm run worst_case --duration 60 --out wide
 
-cspm identify lengths calm_60s --out lengths""",
-)
-def lengths(
+cspm identify geometry wide --out geometry"""
+
+
+@identify.command("lengths", cls=JudgedCommand, hidden=True, epilog=_GEOMETRY_EXAMPLE)
+@identify.command(cls=JudgedCommand, epilog=_GEOMETRY_EXAMPLE)
+def geometry(
     recordings: Annotated[
         list[Path],
         typer.Argument(
             metavar="REC...",
-            help="Recordings of motor angles and the poses of what moves; neither torque nor"
-            " tension is needed.",
+            help="Recordings of motor angles and the poses of what moves; tensions, where there"
+            " are load cells, give the stretch.",
         ),
     ],
     testbed: MachineFile = None,
@@ -292,11 +293,11 @@ def lengths(
     out: Out = None,
     json: Json = None,
 ) -> None:
-    """Hold encoders against cable lengths. Those of measured poses give scale, zero and sag."""
+    """Fit where cables begin and end. Exits, attachments and drum radii, from poses and angles."""
     begin_judged(FITTED, recordings, held_out or (), testbed, out)
-    from cspm.commands.identify_lengths_command import identify_lengths_command
+    from cspm.commands.identify_geometry_command import identify_geometry_command
 
-    _end(identify_lengths_command(tuple(recordings), tuple(held_out or ()), testbed, out, json))
+    _end(identify_geometry_command(tuple(recordings), tuple(held_out or ()), testbed, out, json))
 
 
 @identify.command(

@@ -55,7 +55,7 @@ def fitted_testbed(result: SystemResult, file: TestbedFile, source: str) -> Test
         if isinstance(each.place, EffectPlace):
             _put_effect(content, file.testbed, each.place, number)
         elif isinstance(each.place, PointPlace):
-            _put_point(content["cables"], each.place, number)
+            put_point(content["cables"], each.place, number)
         elif file.testbed.bar is not None:
             _put_bar(content["bar"], file.testbed.bar, each.place, number)
     stream = io.StringIO()
@@ -115,8 +115,8 @@ def _put_bar(content: Content, bar: Bar, place: BarPlace, number: FittedNumber) 
             content[key] = wanted.content()
 
 
-def _put_point(cables: Content, place: PointPlace, number: FittedNumber) -> None:
-    """Put one coordinate in; the others keep what the file said of the whole point."""
+def put_point(cables: Content, place: PointPlace, number: FittedNumber) -> None:
+    """Put one coordinate into a file's cables; the others keep what it said of the whole point."""
     for cable in cables:
         # What took the point from this cable by `<<` keeps it as it was.
         if place.point not in dict(cable.non_merged_items()):

@@ -56,7 +56,8 @@ def _below(command: Command, name: str) -> Iterator[tuple[str, Command]]:
     if below is None:
         yield name, command
     else:
-        for word, each in sorted(below.items()):
+        # A hidden command is another one's former name.
+        for word, each in sorted((w, c) for w, c in below.items() if not c.hidden):
             yield from _below(each, f"{name} {word}")
 
 

@@ -26,7 +26,7 @@ COMMANDS = {
 # Their work begins with fits, or with statistics and filters, which load `scipy.optimize` too.
 FITTING = {
     *("analysis.analyze_sag_command", "import_command", "compare_command", "demo_command"),
-    *("diagnose_command", "identify_damping_command", "identify_lengths_command"),
+    *("diagnose_command", "identify_damping_command", "identify_geometry_command"),
     *("identify_stiffness_command", "identify_system_command", "identify_winch_command"),
 }
 

@@ -6,7 +6,10 @@ from error_lines import said
 from cspm.cli.held_out import JudgedCommand, refuse_searched_after_held_out
 from cspm_msgs_py.errors import InputError
 
-JUDGED = [("diagnose",), ("identify", "lengths"), ("identify", "system"), ("identify", "winch")]
+JUDGED = [
+    ("diagnose",),
+    *(("identify", name) for name in ("geometry", "lengths", "system", "winch")),
+]
 
 
 def test_all_commands_with_the_option_look_at_the_order(commands):

@@ -1,0 +1,1 @@
+"""Self-calibration: where cables begin and end, from poses and encoders."""

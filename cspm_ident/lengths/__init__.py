@@ -1,1 +1,0 @@
-"""Encoders against measured poses: cable lengths without torque or tension."""

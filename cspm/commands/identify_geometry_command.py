@@ -53,13 +53,13 @@ def identify_geometry_command(
 
 
 def print_geometry(console: Console, result: GeometryResult) -> None:
-    """Print what each number is off by, what is beyond its accuracy, and what is not told."""
+    """Print what each number is off by, what is beyond its accuracy, and what is not determined."""
     for end in ENDS:
-        title = f"{end}s: off by, mm, ± half of 95 %; in brackets: not told by the motion"
+        title = f"{end}s: off by, mm, ± half of 95 %; in brackets: not determined by the motion"
         names = [f"{end} {axis}" for axis in AXES]
         console.print(_table(title, ("cable", *AXES), result, names))
     shares = [RADIUS, STIFFNESS][: len(result.cables[0].numbers) - 6]
-    title = "off by, % of the file's number; in brackets: not told by the motion"
+    title = "off by, % of the file's number; in brackets: not determined by the motion"
     console.print(_table(title, ("cable", *shares), result, shares))
     say(console, f"poses are stamped late by {_text(result.lateness)} ms")
     for cable in result.cables:
@@ -78,8 +78,8 @@ def print_geometry(console: Console, result: GeometryResult) -> None:
     still = [cable.name for cable in result.cables if not cable.moves]
     if still:
         say(console, f"no motion, so no radius identified: {', '.join(still)}")
-    if result.untold:
-        console.print(_untold_table(result.untold))
+    if result.undetermined:
+        console.print(_undetermined_table(result.undetermined))
     console.print(_error_table(result))
 
 
@@ -93,7 +93,7 @@ def _text(number: Number) -> str:
     size, _ = _SHOWN[number.unit]
     half = 0.5 * (number.ci95[1] - number.ci95[0])
     text = f"{size * number.off:.3g} ± {size * half:.2g}"
-    return text if number.told else f"({text})"
+    return text if number.determined else f"({text})"
 
 
 def _table(title: str, heads: Sequence[str], result: GeometryResult, names: Sequence[str]) -> Table:
@@ -105,10 +105,12 @@ def _table(title: str, heads: Sequence[str], result: GeometryResult, names: Sequ
     return table
 
 
-def _untold_table(combinations: Sequence[Combination]) -> Table:
-    title = "not told by this motion: standard deviation before, after, and with a further motion"
+def _undetermined_table(combinations: Sequence[Combination]) -> Table:
+    title = (
+        "not determined by this motion: standard deviation before, after, and with a further motion"
+    )
     table = Table(title=title, box=box.SIMPLE)
-    for head in ("combination", "cables", "before", "after", "motion that tells", "then"):
+    for head in ("combination", "cables", "before", "after", "motion that determines it", "then"):
         table.add_column(head)
     for each in combinations:
         size, unit = _SHOWN[each.unit]

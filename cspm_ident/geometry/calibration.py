@@ -27,6 +27,8 @@ _FLOOR_M = 1e-6
 # less than in full, or few blocks would make differences between cables exact.
 _CORRELATED = 0.9
 _FIRST_M = 1e-3
+# At first little is held, or what the accuracies hold back would pass for noise.
+_WIDE = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +90,7 @@ def calibrate(records: Sequence[LengthRows]) -> Calibration:
     unknowns = Unknowns(n, np.asarray(most > 0.0))
     listed = unknowns.listed
     usual = np.array([each.accuracy for each in listed])
-    factors = dict.fromkeys((each.group for each in listed), 1.0)
+    factors = dict.fromkeys((each.group for each in listed), _WIDE)
     values, weight = np.zeros(len(listed)), np.eye(n) / (_FIRST_M**2 * RATE)
     freedom = np.inf
     for done in range(_ROUNDS):

@@ -1,4 +1,4 @@
-"""What a motion cannot tell of a geometry, and which motion would."""
+"""What a motion leaves undetermined of a geometry, and which motion would not."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from cspm_msgs_py.dofs import DOFS
 
 Array = NDArray[np.float64]
 
-# Of what was known beforehand: what is known no better than this the motion does not tell.
-UNTOLD = 0.5
+# Of what was known beforehand: what is known no better than this the motion leaves undetermined.
+UNDETERMINED = 0.5
 _AXES = "xyz"
 # A further recording: seconds, strokes as shares of the mean cable length, and angles [rad].
 _SECONDS, _STROKE, _ANGLE = 30.0, 0.1, 0.2
@@ -37,7 +37,7 @@ class Combination(NamedTuple):
         unit: m or rad.
         accuracy: standard deviation before the recordings.
         sd: after them, of the least known.
-        motion: the single sweep that would tell most; empty where none tells.
+        motion: the single sweep that would determine most; empty where none does.
         sd_with: after that motion as well.
     """
 
@@ -54,7 +54,7 @@ class Combination(NamedTuple):
         return {**self._asdict(), "cables": list(self.cables), "motion": self.motion or None}
 
 
-def untold(
+def undetermined(
     found: Calibration, records: Sequence[LengthRows], names: Sequence[str], *, moves: bool
 ) -> tuple[Combination, ...]:
     """Return the combinations that recordings leave as they were, with the motion for each.
@@ -72,15 +72,15 @@ def untold(
     for name, unit, cables, directions in _named(found, rows, points, names):
         lines = directions @ seen
         sd, before = found.spread(lines), found.accuracy(lines)
-        left = np.flatnonzero((sd > UNTOLD * before) & (before < _EXTENT[unit]))
+        left = np.flatnonzero((sd > UNDETERMINED * before) & (before < _EXTENT[unit]))
         if not len(left):
             continue
         worst = int(left[np.argmax(sd[left])])
         motion, after = _best(found, sweeps, lines[worst])
-        told = after < UNTOLD * sd[worst]
+        determined = after < UNDETERMINED * sd[worst]
         which = tuple(cables[i] for i in left) if cables else ()
         place = float(before[worst]), float(sd[worst])
-        listed.append(Combination(name, which, unit, *place, motion if told else "", after))
+        listed.append(Combination(name, which, unit, *place, motion if determined else "", after))
     return tuple(listed)
 
 

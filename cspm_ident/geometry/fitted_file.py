@@ -57,8 +57,8 @@ def _number(
     """Return a number as described, with what it is off by in `unit` added."""
     found = cable.number(name)
     low, high = (described + unit * end for end in found.ci95)
-    if not found.told:
-        note = "; ".join([each for each in (note, "not told by the motion") if each])
+    if not found.determined:
+        note = "; ".join([each for each in (note, "not determined by the motion") if each])
     hashes = tuple(m.sha256 for m in result.searched)
     windows = tuple((0.0, m.duration) for m in result.searched)
     return FittedNumber(described + unit * found.off, (low, high), hashes, windows, note)

@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from cspm_ident.estimation.objection import Objection
 from cspm_ident.geometry.calibration import Calibration, calibrate
-from cspm_ident.geometry.combinations import UNTOLD, Combination, untold
+from cspm_ident.geometry.combinations import UNDETERMINED, Combination, undetermined
 from cspm_ident.geometry.length_rows import LengthRows, length_rows
 from cspm_ident.geometry.unknowns import ENDS, SCALE, STRETCH
 from cspm_ident.recording_roles import check_roles
@@ -38,7 +38,7 @@ class Number(NamedTuple):
         off: by how much it is off.
         ci95: interval of that.
         accuracy: standard deviation that it is usually known with; infinite where it is not.
-        told: whether the recordings tell it, by at least twice its accuracy.
+        determined: whether the recordings make it known at least twice as well as before.
         beyond: whether it is off by more than its accuracy and interval allow, for the count of
             numbers looked at.
     """
@@ -48,7 +48,7 @@ class Number(NamedTuple):
     off: float
     ci95: tuple[float, float]
     accuracy: float
-    told: bool
+    determined: bool
     beyond: bool
 
     def data(self) -> dict[str, Any]:
@@ -114,14 +114,14 @@ class GeometryResult:
     Attributes:
         cables: in the file's order.
         lateness: of the poses' stamps against the encoders'.
-        untold: combinations that the recordings do not tell.
+        undetermined: combinations that the recordings leave undetermined.
         factors: by group of numbers, by how much they are farther off than usual.
         searched: recordings that were fitted.
     """
 
     cables: tuple[CableGeometry, ...]
     lateness: Number
-    untold: tuple[Combination, ...]
+    undetermined: tuple[Combination, ...]
     factors: dict[str, float]
     searched: tuple[Measurement, ...]
 
@@ -136,7 +136,7 @@ class GeometryResult:
             "recordings": [{"path": str(m.path), "sha256": m.sha256} for m in self.searched],
             "cables": [cable.data() for cable in self.cables],
             "pose_lateness": self.lateness.data(),
-            "untold": [each.data() for each in self.untold],
+            "undetermined": [each.data() for each in self.undetermined],
             "accuracy_factors": self.factors,
         }
 
@@ -179,7 +179,7 @@ def identify_geometry(
         )
     )
     moves = machine.winch_frame is not None and searched[0].frame_pose is not None
-    left = untold(fit, own, machine.cable_names, moves=moves)
+    left = undetermined(fit, own, machine.cable_names, moves=moves)
     return GeometryResult(cables, _lateness(fit), left, fit.factors, tuple(searched))
 
 
@@ -226,8 +226,8 @@ def _number(
     half = fit.quantile * sd
     deviate = float(norm.isf(0.5 * _LEVEL / looked))
     beyond = abs(off) > deviate * np.hypot(accuracy, half / norm.isf(0.025))
-    told = sd < UNTOLD * before
-    return Number(name, unit, off, (off - half, off + half), accuracy, told, bool(beyond))
+    determined = sd < UNDETERMINED * before
+    return Number(name, unit, off, (off - half, off + half), accuracy, determined, bool(beyond))
 
 
 def _lateness(fit: Calibration) -> Number:

@@ -45,7 +45,7 @@ class Unknowns:
 
     Attributes:
         n: cables.
-        moving: of each cable, whether its winch turns; one that does not tells no radius.
+        moving: of each cable, whether its winch turns; one that does not shows no radius.
     """
 
     n: int
@@ -62,18 +62,18 @@ class Unknowns:
         return [*own * self.n, *place, *turn, *place, *turn, Unknown("lateness", _LATENESS_SD)]
 
     def of_cable(self, i: int) -> NDArray[np.intp]:
-        """Return where in the vector stands what cable i's length depends on."""
+        """Return the places in the vector of what cable i's length depends on."""
         own = np.arange(_OWN) + _OWN * i
         return np.concatenate([own, _OWN * self.n + np.arange(_COMMON)])
 
     def markers(self, end: str) -> slice:
-        """Return where the markers' place and turn stand of the body that has such ends."""
+        """Return where the place and turn of the markers are of the body that has such ends."""
         first = _OWN * self.n + 6 * ENDS.index(end)
         return slice(first, first + 6)
 
     @property
     def lateness(self) -> int:
-        """Where the poses' lateness stands."""
+        """The place of the lateness of the poses."""
         return _OWN * self.n + _COMMON - 1
 
     def seen(self, points: Array) -> Array:

@@ -33,7 +33,7 @@ def test_what_is_beyond_its_accuracy_is_said_in_words(printed):
 
 def test_combinations_lateness_and_errors_are_listed(printed):
     result, text = printed
-    for each in result.untold:
+    for each in result.undetermined:
         assert each.name in text
     assert "poses are stamped late by" in text
     assert "synthetic_3" in text

@@ -27,9 +27,11 @@ def moved():
 
 
 def ends(result):
-    """Offsets (n, 6), their intervals (n, 6, 2), and which are told, (n, 6)."""
+    """Offsets (n, 6), their intervals (n, 6, 2), and which are determined, (n, 6)."""
     found = [cable.numbers[:6] for cable in result.cables]
-    parts = [[[getattr(x, name) for x in row] for row in found] for name in ("off", "ci95", "told")]
+    parts = [
+        [[getattr(x, name) for x in row] for row in found] for name in ("off", "ci95", "determined")
+    ]
     return tuple(np.array(part) for part in parts)
 
 
@@ -40,10 +42,10 @@ def beyond(result):
 def test_errors_of_two_millimetres_are_within_their_intervals(moved):
     """Of 48 intervals of 95 % two or three may miss."""
     truth, result = moved
-    off, interval, told = ends(result)
+    off, interval, determined = ends(result)
     inside = (interval[..., 0] <= truth) & (truth <= interval[..., 1])
     assert inside.sum() >= 44
-    assert told.sum() >= 44
+    assert determined.sum() >= 44
     half = 0.5 * np.ptp(interval, axis=2)
     sharp = half < 2e-4
     assert sharp.sum() >= 30
@@ -121,14 +123,16 @@ def test_a_machine_without_winch_frame_has_its_exits_in_the_world():
     _, interval, _ = ends(result)
     inside = (interval[..., 0] <= survey(14)) & (survey(14) <= interval[..., 1])
     assert inside.sum() >= 44
-    assert not any("winch frame" in each.motion for each in result.untold)
+    assert not any("winch frame" in each.motion for each in result.undetermined)
 
 
 def test_what_straight_motion_does_not_tell_is_named_with_the_motion_that_does(moved):
     straight = measured(survey(11), noise=NOISE, **STRAIGHT)
     result = identify_geometry([straight])
     together = {
-        each.name: each for each in result.untold if each.name.startswith("exit and attachment")
+        each.name: each
+        for each in result.undetermined
+        if each.name.startswith("exit and attachment")
     }
     assert len(together) == 3
     assert "in z" in [*together][2]
@@ -136,12 +140,12 @@ def test_what_straight_motion_does_not_tell_is_named_with_the_motion_that_does(m
         assert each.cables == tuple(f"c{i}" for i in range(8))
         assert "rad in " in each.motion
         assert each.sd_with < 0.5 * each.sd
-    told = {each.name for each in moved[1].untold}
-    assert not told & set(together)
+    determined = {each.name for each in moved[1].undetermined}
+    assert not determined & set(together)
     # The turns are recorded as well: what was expected of them comes true.
     sweep = {"bar": BAR * [0, 0, 0, 1, 1, 1], "frame": 0.0 * FRAME}
     both = identify_geometry([straight, measured(survey(11), noise=NOISE, seed=4, **sweep)])
-    assert not {each.name for each in both.untold} & set(together)
+    assert not {each.name for each in both.undetermined} & set(together)
 
 
 def test_an_angle_of_the_other_sign_is_no_result():

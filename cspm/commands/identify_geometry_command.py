@@ -9,7 +9,6 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cspm.commands.data_look_lines import FITTED, print_roles
 from cspm.commands.identify_outcome import hand_out
 from cspm.commands.progress_shown import shown
 from cspm.identification.geometry import identify_geometry
@@ -22,7 +21,6 @@ from cspm_ident.geometry.identify_geometry import (
     Number,
 )
 from cspm_ident.geometry.unknowns import ENDS
-from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.library import named_testbed
 from cspm_run.output.console import make_console, say
 
@@ -45,8 +43,6 @@ def identify_geometry_command(
         InputError: recordings, test-bed or options cannot be used.
     """
     console = make_console()
-    refuse_existing(out)
-    print_roles(console, recordings, held_out, FITTED)
     with shown(console, "geometry"):
         found = identify_geometry(recordings, held_out=held_out, testbed=named_testbed(testbed))
     return hand_out(found, print_geometry, out, json)

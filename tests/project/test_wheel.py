@@ -194,6 +194,7 @@ def test_a_base_installation_knows_what_it_lacks(environment, tmp_path):
 def test_without_an_extra_a_command_ends_with_the_line_that_installs_it(
     environment, tmp_path, words, extra
 ):
+    (tmp_path / "sweep.yaml").write_text("scenario: rest\n", encoding="utf-8")
     (tmp_path / "lab.xlsx").write_bytes(b"PK\x03\x04" + bytes(600))
     done = finished([environment / "bin" / "cspm", *words.split()], tmp_path)
     assert done.returncode == 2, done.stderr

@@ -16,7 +16,6 @@ from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import MappingFile, load_mapping
 from cspm_ident.importing.mended_mapping import mended_mapping
 from cspm_ident.importing.preparation import prepare
-from cspm_ident.offline_page import table_html, write_offline_page
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.recording.attached_testbed import attached_testbed
@@ -165,6 +164,9 @@ def _looked_at(pace: Pace) -> str:
 
 def _write_page(path: Path, source: Path, found: Checked) -> None:
     """Write what was looked at, what is wrong, when, and the key that mends it."""
+    # Plotly, whose script a page may hold, loads for a page alone.
+    from cspm_ident.offline_page import table_html, write_offline_page
+
     looked = [(name, _looked_at(pace)) for name, pace in found.paces.items()]
     wrong = [
         (one.where, one.kind, one.text, ", ".join(f"{at:.6g}" for at in one.at_s), one.remedy)

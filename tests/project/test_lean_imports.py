@@ -32,7 +32,12 @@ FITTING = {
         "compare_command",
         "demo_command",
     ),
-    *("diagnose_command", "identify_damping_command", "identify_geometry_command"),
+    *(
+        "recordings.check_command",
+        "diagnose_command",
+        "identify_damping_command",
+        "identify_geometry_command",
+    ),
     *("identify_stiffness_command", "identify_system_command", "identify_winch_command"),
 }
 

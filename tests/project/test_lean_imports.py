@@ -25,19 +25,10 @@ COMMANDS = {
 }
 # Their work begins with fits, or with statistics and filters, which load `scipy.optimize` too.
 FITTING = {
-    *(
-        "analysis.analyze_sag_command",
-        "analysis.plan_command",
-        "import_command",
-        "compare_command",
-        "demo_command",
-    ),
-    *(
-        "recordings.check_command",
-        "diagnose_command",
-        "identify_damping_command",
-        "identify_geometry_command",
-    ),
+    *("analysis.analyze_sag_command", "analysis.plan_command", "import_command"),
+    *("compare_command", "demo_command", "diagnose_command"),
+    *("recordings.check_command", "recordings.demo_real_command"),
+    *("identify_damping_command", "identify_geometry_command"),
     *("identify_stiffness_command", "identify_system_command", "identify_winch_command"),
 }
 

@@ -40,6 +40,8 @@ class Equilibrium(NamedTuple):
 
 
 NOTHING = np.zeros(6)
+# Share of the largest singular value of the structure matrix, below which it hardly holds.
+_WEAK = 0.01
 
 
 def gravity_wrench(parameters: PlantParameters, bar_pose: ArrayLike) -> Array:
@@ -77,8 +79,8 @@ def find_equilibrium(
         else:
             pose = _balanced_pose(parameters, pose, frame_pose, limits, load, free)
     elif not _is_held(parameters, pose, frame_pose, limits, load):
-        weakest = _weakest_axis(parameters, pose, frame_pose)
-        near = _balanced_pose(parameters, pose, frame_pose, limits, load, [weakest])
+        weak = _weak_axes(parameters, pose, frame_pose)
+        near = _balanced_pose(parameters, pose, frame_pose, limits, load, weak) if weak else pose
         pose = near if _is_held(parameters, near, frame_pose, limits, load) else pose
     tensions = _hold(parameters, pose, frame_pose, limits, load)
     lengths = geometry(parameters.cables, pose, frame_pose).lengths
@@ -184,10 +186,16 @@ def _is_held(
     return _residual(structure, tensions, wrench) <= RESIDUAL_TOLERANCE
 
 
-def _weakest_axis(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike) -> int:
-    """Return the coordinate in which the cables move the bar least per tension."""
+def _weak_axes(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike) -> list[int]:
+    """Return the coordinate in which the cables hold the bar a hundred times less than in others.
+
+    None where they hold it in all: then its tensions are at their limits for the load's sake.
+    """
     structure = geometry(parameters.cables, pose, frame_pose).bar.T
-    return int(np.argmax(np.abs(np.linalg.svd(structure)[0][:, -1])))
+    directions, sizes, _ = np.linalg.svd(structure)
+    if sizes[-1] > _WEAK * sizes[0]:
+        return []
+    return [int(np.argmax(np.abs(directions[:, -1])))]
 
 
 def _balanced(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, load: Array) -> bool:

@@ -245,7 +245,7 @@ def test_a_recording_counts_once_whatever_its_name_and_has_to_be_long_enough(csp
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "no recording, allowed: one or more, or --explain EFFECT"),
+        ((), "no recording, allowed: one or more, --explain EFFECT or --plan SCENARIO"),
         (("--explain", "gremlins"), "--explain gremlins: allowed: bar_com, "),
         (("one", "--out", "taken"), "taken: already exists, allowed: a new folder"),
     ],

@@ -70,7 +70,10 @@ def test_help_has_frames_only_where_there_is_room(columns, framed):
         (["run", "nowhere"], "cspm run: nowhere: no such scenario, allowed: "),
         (["identify", "winch", "nowhere"], "cspm identify winch: nowhere: no such file or folder"),
         # A line that names its command itself names it once.
-        (["diagnose"], "cspm diagnose: no recording, allowed: one or more, or --explain EFFECT"),
+        (
+            ["diagnose"],
+            "cspm diagnose: no recording, allowed: one or more, --explain EFFECT or --plan SCENARIO",
+        ),
     ],
 )
 def test_an_error_begins_with_the_whole_command(cspm, words, line):

@@ -254,8 +254,8 @@ def test_the_command_prints_what_was_found(result, tmp_path):
         (["--out", "."], ".: already exists, allowed: a new folder"),
     ],
 )
-def test_wrong_options_are_one_line(cspm, words, text):
-    assert cspm("identify", "system", "nothing", *words) == (
+def test_wrong_options_are_one_line(cspm, tmp_path, words, text):
+    assert cspm("identify", "system", str(tmp_path), "--quiet", *words) == (
         2,
         "",
         f"cspm identify system: {text}\n",

@@ -184,7 +184,7 @@ def test_unpacked_files_are_removed(tmp_path, monkeypatch):
     with open_bag(path) as bag:
         assert len(list(bag.messages())) == 10
         assert len(list(folder.rglob("*.db3"))) == 1
-    assert list(folder.iterdir()) == []
+    assert list(folder.glob("*/*/*")) == []
 
 
 STEPS = 120

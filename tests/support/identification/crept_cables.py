@@ -5,7 +5,7 @@ import numpy as np
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_sim.effects import Channel, catalogue
 
-TRUE = np.array([2e-3])
+TRUE = np.array([2e-3, 0.0])
 CREPT, HEALTHY = Place(Channel.TENSION, "sway_2"), Place(Channel.TENSION, "sway_3")
 CREEP = """  - effect: cable_creep
     elements: [sway_2]

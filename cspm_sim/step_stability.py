@@ -144,7 +144,8 @@ def steps_along(
 def is_stable(modes: Complex, rate: int) -> bool:
     """Return whether the step of a plant's rate [Hz] keeps modes (k,) [1/s] bounded."""
     z = modes / rate
-    growth = np.abs(1.0 + z * (1.0 + z * (0.5 + z * (1.0 / 6.0 + z / 24.0))))
+    with np.errstate(over="ignore", invalid="ignore"):
+        growth = np.abs(1.0 + z * (1.0 + z * (0.5 + z * (1.0 / 6.0 + z / 24.0))))
     return bool((growth <= 1.0 + SLACK).all())
 
 

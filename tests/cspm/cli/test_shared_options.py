@@ -72,7 +72,8 @@ def test_help_has_frames_only_where_there_is_room(columns, framed):
         # A line that names its command itself names it once.
         (
             ["diagnose"],
-            "cspm diagnose: no recording, allowed: one or more, --explain EFFECT or --plan SCENARIO",
+            "cspm diagnose: no recording, allowed: one or more, --explain EFFECT or --plan"
+            " SCENARIO",
         ),
     ],
 )

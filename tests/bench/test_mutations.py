@@ -25,7 +25,7 @@ def test_sixty_lines_are_drawn_from_all_packages():
     packages = Counter(each.file.split("/")[0] for each in mutations())
     assert sum(packages.values()) >= 60
     assert packages.keys() == {
-        *("cspm_msgs_py", "cspm_model", "cspm_sim", "cspm_control", "cspm_run"),
+        *("cspm_msgs_py", "cspm_model", "cspm_sim", "cspm_checks", "cspm_control", "cspm_run"),
         *("cspm_ident", "cspm_ros", "cspm", "bench"),
     }
     assert min(packages.values()) >= 3

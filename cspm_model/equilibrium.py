@@ -180,10 +180,17 @@ def _is_held(
     parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array, load: Array
 ) -> bool:
     """Return whether tensions within the limits hold the bar at a pose."""
+    return _nearest(parameters, pose, frame_pose, limits, load)[1] <= RESIDUAL_TOLERANCE
+
+
+def _nearest(
+    parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array, load: Array
+) -> tuple[Array, float]:
+    """Return the tensions within the limits that come closest to rest, and what they miss."""
     structure = -geometry(parameters.cables, pose, frame_pose).bar.T
     wrench = -gravity_wrench(parameters, pose) - load
     tensions = least_tensions(structure, wrench, limits)
-    return _residual(structure, tensions, wrench) <= RESIDUAL_TOLERANCE
+    return tensions, _residual(structure, tensions, wrench)
 
 
 def _weak_axes(parameters: PlantParameters, pose: Array, frame_pose: ArrayLike) -> list[int]:
@@ -213,10 +220,7 @@ def _residual(structure: Array, tensions: Array, wrench: Array) -> float:
 def _hold(
     parameters: PlantParameters, pose: Array, frame_pose: ArrayLike, limits: Array, load: Array
 ) -> Array:
-    structure = -geometry(parameters.cables, pose, frame_pose).bar.T
-    wrench = -gravity_wrench(parameters, pose) - load
-    tensions = least_tensions(structure, wrench, limits)
-    residual = _residual(structure, tensions, wrench)
+    tensions, residual = _nearest(parameters, pose, frame_pose, limits, load)
     if residual > RESIDUAL_TOLERANCE:
         place = ", ".join(f"{value:.4g}" for value in pose)
         raise ConvergenceError(

@@ -7,7 +7,6 @@ within the root of the sum of the squares of both half-widths.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Mapping, Sequence
 from itertools import combinations
@@ -15,8 +14,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import cspm
-from bench.concealed.machine import Machine, machines
-from bench.markdown import markdown_table
+from bench.concealed.machine import Machine
+from bench.concealed.machine_table import print_machine_table
 from bench.real.dataset import Dataset
 from cspm_ident.diagnosis.reporting.verdict import named_in
 
@@ -82,15 +81,11 @@ def rows_of(machine: Machine, place: Path) -> list[tuple[str, ...]]:
 
 def main() -> None:
     """Run the command line."""
-    parser = argparse.ArgumentParser(prog="python -m bench.concealed.scatter", description=__doc__)
-    parser.add_argument("folders", nargs="+", type=Path, metavar="DIR")
-    folders = parser.parse_args().folders
-    rows = []
-    for machine in machines():
-        place = machine.dataset.place(folders)
-        if place is not None and machine.name in FURTHER:
-            rows += rows_of(machine, place)
-    print(markdown_table(_HEADS, rows))
+
+    def wanted(machine: Machine, place: Path) -> list[tuple[str, ...]]:
+        return rows_of(machine, place) if machine.name in FURTHER else []
+
+    print_machine_table("bench.concealed.scatter", __doc__, _HEADS, wanted)
 
 
 if __name__ == "__main__":

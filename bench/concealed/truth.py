@@ -6,12 +6,11 @@
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from pathlib import Path
 
-from bench.concealed.machine import INERTIA, Machine, machines
-from bench.markdown import markdown_table
+from bench.concealed.machine import INERTIA, Machine
+from bench.concealed.machine_table import print_machine_table
 from bench.real.least_squares import least_squares
 from cspm_ident.signals.measurement import read_measurement
 
@@ -44,15 +43,12 @@ def _more(parameters: dict[str, float], inertia: float) -> dict[str, float]:
 
 def main() -> None:
     """Run the command line."""
-    parser = argparse.ArgumentParser(prog="python -m bench.concealed.truth", description=__doc__)
-    parser.add_argument("folders", nargs="+", type=Path, metavar="DIR")
-    folders = parser.parse_args().folders
-    rows = []
-    for machine in machines():
-        place = machine.dataset.place(folders)
-        if place is not None and machine.inertia:
-            rows += runs_of(machine, place)
-    print(markdown_table(("machine", "run", "least squares", "unexplained [N·m]"), rows))
+
+    def wanted(machine: Machine, place: Path) -> list[tuple[str, ...]]:
+        return runs_of(machine, place) if machine.inertia else []
+
+    heads = ("machine", "run", "least squares", "unexplained [N·m]")
+    print_machine_table("bench.concealed.truth", __doc__, heads, wanted)
 
 
 if __name__ == "__main__":

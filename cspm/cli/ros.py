@@ -11,6 +11,14 @@ from cspm.cli.app import RUN_FAILED, Json, app
 from cspm.cli.shared_options import COMMAND
 from cspm_msgs_py.errors import InputError
 
+_Machine = Annotated[
+    str, typer.Argument(metavar="TESTBED", help="A machine of the library, or its file.")
+]
+_NewFile = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="A new file; without it to standard output."),
+]
+
 
 @app.command(
     add_help_option=False,
@@ -256,13 +264,8 @@ cspm urdf lab.yaml --out lab.urdf
 Exit code: 0 done, 2 unusable input, 130 interrupted."""
 )
 def urdf(
-    testbed: Annotated[
-        str, typer.Argument(metavar="TESTBED", help="A machine of the library, or its file.")
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="A new file; without it to standard output."),
-    ] = None,
+    testbed: _Machine,
+    out: _NewFile = None,
 ) -> None:
     """Write a machine as URDF. For robot_state_publisher, RViz, Foxglove and ros2_control.
 
@@ -282,13 +285,8 @@ cspm mjcf fitted/fitted_testbed.yaml --out joints.xml
 Then, in a model of MuJoCo: <include file="joints.xml"/>, and <joint class="NAME" …/>."""
 )
 def mjcf(
-    testbed: Annotated[
-        str, typer.Argument(metavar="TESTBED", help="A machine of the library, or its file.")
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="A new file; without it to standard output."),
-    ] = None,
+    testbed: _Machine,
+    out: _NewFile = None,
     json: Json = None,
 ) -> None:
     """Write winches as joints of MuJoCo. Armature, damping and friction loss, as identified.

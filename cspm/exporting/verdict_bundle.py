@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import platform
-import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
@@ -16,6 +15,7 @@ from cspm.exporting.anonymous_recording import MACHINE, copy_without_names, with
 from cspm_ident.diagnosis_file import IMPROVED, REPORT, DiagnosisFile, read_diagnosis
 from cspm_ident.recording_hash import recording_sha256
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording import Recording
 from cspm_msgs_py.recording.attached_testbed import TESTBED, attached_testbed
 from cspm_msgs_py.testbed import TestbedFile, load_testbed
@@ -50,8 +50,7 @@ def write_bundle(
     places = _places(recordings, found)
     machine = _machine(found, places, testbed)
     names = {str(path): f"recording_{i}" for i, path in enumerate(places, 1)}
-    with tempfile.TemporaryDirectory(prefix="cspm-") as temporary:
-        place = Path(temporary)
+    with ScratchFolder("bundle") as place:
         code: list[str] = []
         for path, name in names.items():
             code += copy_without_names(Path(path), place / name, machine.testbed.topics)

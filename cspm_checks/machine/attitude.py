@@ -53,7 +53,7 @@ def attitude_suspicions(where: str, one: Poses) -> list[Suspicion]:
     steps = np.where(spans <= _GAP * usual, 2.0 * np.arccos(np.minimum(turns, 1.0)), 0.0)
     jumps = impossible_steps(steps)[0]
     jumps = np.union1d(jumps[steps[jumps] > LEAST], np.flatnonzero(steps > SURELY))
-    # A camera that held its last frames steps on: that is told as held.
+    # A camera that held its last frames steps on: that is reported as held.
     held = [is_held(one.turns[:, 0], int(row) + 1) for row in jumps]
     jumps = jumps[~np.array(held, dtype=np.bool_)]
     if not len(jumps) or len(jumps) > MOST * len(steps):

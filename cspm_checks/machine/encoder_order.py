@@ -77,7 +77,7 @@ def _reversed(
 ) -> list[Suspicion]:
     """Return which encoders count the other way; all of them in one word."""
 
-    def told(where: str, some: list[int]) -> Suspicion:
+    def exchanged(where: str, some: list[int]) -> Suspicion:
         text = "counts the other way" if len(some) == 1 else "count the other way, all of them"
         text += f": by the poses, apart by {1e3 * before[some].max():.3g} mm (RMS) as it is, by"
         text += f" {1e3 * after[some].max():.2g} mm reversed"
@@ -85,8 +85,8 @@ def _reversed(
         return Suspicion(where, "reversed", text, mend=mend)
 
     if len(which) == len(names) > 1:
-        return [told(f"{STATE} position", which)]
-    return [told(f"{STATE} position/{names[order[i]]}", [i]) for i in which]
+        return [exchanged(f"{STATE} position", which)]
+    return [exchanged(f"{STATE} position/{names[order[i]]}", [i]) for i in which]
 
 
 def _exchanged(

@@ -43,9 +43,9 @@ def pose_lateness(seen: Winding) -> Lateness | None:
     for i, angle in enumerate(seen.angles):
         lengths = SensorSeries(seen.bar.time - since, seen.lengths[:, i])
         found.append(lateness(angle, lengths, [], (0,)))
-    told = [late for late in found if late is not None]
-    if len(told) >= FEWEST_WINCHES:
-        late = _of_all(told)
+    known = [late for late in found if late is not None]
+    if len(known) >= FEWEST_WINCHES:
+        late = _of_all(known)
         # Shifts of less than a sample that gain nothing count as none.
         error = max(late.error, 0.5 * late.interval) if shift else late.error
         return late._replace(seconds=late.seconds + since, error=error)

@@ -23,12 +23,13 @@ def mujoco_joints(testbed: Testbed) -> str:
     """
     root = ET.Element("mujoco", model=testbed.name)
     defaults = ET.SubElement(root, "default")
+    numbers = joint_numbers(testbed)
     for cable in testbed.cables:
         own = ET.SubElement(defaults, "default", {"class": cable.name})
         for effect in _left_out(testbed, cable.name):
             own.append(ET.Comment(f" {effect}: left out, MuJoCo's joints have none "))
-        numbers = joint_numbers(testbed)[cable.name]
-        ET.SubElement(own, "joint", {name: f"{value:.8g}" for name, value in numbers.items()})
+        joint = {name: f"{value:.8g}" for name, value in numbers[cable.name].items()}
+        ET.SubElement(own, "joint", joint)
         ET.SubElement(own, "motor", _motor(cable))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"

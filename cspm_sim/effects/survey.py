@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from cspm_sim.effects.effect import Effect, EffectParameter, Values
+import numpy as np
 
-ACCURACY = 1e-3
-"""Standard deviation of a surveyed coordinate [m], as of a tape, calliper or total station."""
+from cspm_model.accuracies import ACCURACIES
+from cspm_sim.effects.effect import Array, Effect, EffectParameter, Values
+from cspm_sim.effects.signals import CableSignal, EndSignal
+
+ACCURACY = ACCURACIES["exit"].sd
+"""Standard deviation of a surveyed coordinate [m]; that of an attachment is the same."""
 
 # Two-sided normal deviate at 1 % for the 48 coordinates of eight cables' ends (Bonferroni).
 _DEVIATES = 3.7
@@ -53,3 +57,25 @@ def survey_parameters(key: str, axes: str) -> tuple[EffectParameter, ...]:
 def shifted(place: Sequence[float], values: Values) -> list[float]:
     """Return a place with its offsets x, y, z added."""
     return [old + values[axis] for old, axis in zip(place, "xyz", strict=True)]
+
+
+def pulling_columns(signals: Array, at: slice) -> Array:
+    """Return the first order of a moved end in its cable's tension: a longer cable pulls more.
+
+    Args:
+        signals: `CableSignal` rows.
+        at: slopes of the length over the end's coordinates.
+    """
+    stiffness = signals[:, CableSignal.STIFFNESS, None]
+    return np.asarray((stiffness * signals[:, at])[:, None])
+
+
+def wrench_columns(signals: Array, at: slice) -> Array:
+    """Return the change of the wrench on the bar at constant tension.
+
+    Args:
+        signals: `EndSignal` rows.
+        at: slopes of the wrench per newton over the end's coordinates.
+    """
+    slopes = signals[:, at].reshape(-1, 6, 3)
+    return np.asarray(signals[:, EndSignal.TENSION, None, None] * slopes)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from cspm_checks.drive_limit import LIMIT
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
 from cspm_ident.offline_page import table_html
 from cspm_run.run_statistics import torque_limits
 from cspm_run.stability.saturation import STRETCH_S, saturation_of
-
-_AT_LIMIT = 0.995
 
 
 def data_table(data: dict[str, Any]) -> str:
@@ -41,8 +40,7 @@ def saturation_table(found: Diagnosis) -> str:
     for each in (*found.searched, *found.held_out):
         if each.torque is None:
             continue
-        # Of the limit: drives round what they report.
-        limits = _AT_LIMIT * torque_limits(each.machine)
+        limits = LIMIT * torque_limits(each.machine)
         names, torque = each.machine.cable_names, each.torque
         for drive in saturation_of(torque.times, torque.values, limits, names):
             if drive.longest > 0.0:

@@ -33,8 +33,8 @@ from cspm_ident.diagnosis.regression.significance import Significance
 from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.alternatives import alternatives_of
-from cspm_ident.diagnosis.selection.common_clock import clocks_of, survey_of
 from cspm_ident.diagnosis.selection.element_scope import Scopes
+from cspm_ident.diagnosis.selection.healthy_errors import clocks_of, survey_of
 from cspm_ident.diagnosis.selection.merge import one_instead
 from cspm_ident.diagnosis.selection.onset import first_block
 from cspm_ident.diagnosis.selection.pair_exchange import pair_instead

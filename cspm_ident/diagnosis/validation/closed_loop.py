@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +13,7 @@ from cspm_ident.signals.measurement import BAR, TENSION, Measurement, read_measu
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import CspmError
+from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.run_record import SIM, own_controllers
 from cspm_msgs_py.scenario import ClosedLoop
@@ -98,10 +97,10 @@ def simulate_closed_loop(
     seconds = min(LONGEST_S, recorded.duration)
     steps = round(seconds * bundle.scenario.rates.plant)
     found = []
-    with tempfile.TemporaryDirectory(prefix="cspm-closed-loop-") as place:
+    with ScratchFolder("closed-loop") as place:
         for name, machine in (("described", recorded.testbed), ("found", improved)):
             progress(f"closed loop with the machine as {name}")
-            folder = Path(place) / name
+            folder = place / name
             result = run(replace(bundle, testbed=machine), folder, steps=steps)
             if result.failure:
                 return SimulatedLoop()

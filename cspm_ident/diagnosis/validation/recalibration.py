@@ -42,9 +42,10 @@ def recalibrated(equation: Equation, weights: Mapping[Candidate, Array]) -> Equa
     columns = np.concatenate([equation.columns[c][:, 0] for c in own], axis=1).astype(float)
     moved = _fitted(equation, columns, own)
     parts = np.split(moved, np.cumsum([len(weights[c]) for c in own])[:-1])
-    if not is_negligible({c: weights[c] + by for c, by in zip(own, parts, strict=True)}):
+    further = dict(zip(own, parts, strict=True))
+    if not is_negligible({c: weights[c] + by for c, by in further.items()}):
         return equation
-    return equation.less({c: by for c, by in zip(own, parts, strict=True)})
+    return equation.less(further)
 
 
 def _fitted(equation: Equation, columns: Array, own: list[Candidate]) -> Array:
@@ -52,9 +53,7 @@ def _fitted(equation: Equation, columns: Array, own: list[Candidate]) -> Array:
     free = equation.nuisance[:, 0] if equation.nuisance.size else np.zeros((len(columns), 0))
     accuracies = np.array([p.usual for c in own for p in c.effect.linear], dtype=float)
     both = np.hstack([columns * accuracies, free])
-    sizes = np.append(np.ones(len(accuracies)), np.zeros(free.shape[1]))
-    target = equation.target[:, 0]
-    found = np.linalg.lstsq(
-        np.vstack([both, np.diag(sizes)]), np.append(target, 0.0 * sizes), rcond=None
-    )[0]
+    prior = np.eye(len(accuracies), both.shape[1])
+    target = np.append(equation.target[:, 0], np.zeros(len(prior)))
+    found = np.linalg.lstsq(np.vstack([both, prior]), target, rcond=None)[0]
     return np.asarray(accuracies * found[: len(accuracies)])

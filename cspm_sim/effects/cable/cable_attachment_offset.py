@@ -1,11 +1,10 @@
 """A cable's attachment point beside the place that the test-bed file says."""
 
-import numpy as np
+from functools import partial
 
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effects.alteration import altered_cable
 from cspm_sim.effects.effect import (
-    Array,
     Block,
     Channel,
     Description,
@@ -16,7 +15,13 @@ from cspm_sim.effects.effect import (
     Values,
 )
 from cspm_sim.effects.signals import CableSignal, EndSignal
-from cspm_sim.effects.survey import healthy, shifted, survey_parameters
+from cspm_sim.effects.survey import (
+    healthy,
+    pulling_columns,
+    shifted,
+    survey_parameters,
+    wrench_columns,
+)
 
 _LENGTH = slice(CableSignal.LENGTH_BY_ATTACHMENT, CableSignal.LENGTH_BY_ATTACHMENT + 3)
 _WRENCH = slice(EndSignal.WRENCH_BY_ATTACHMENT, EndSignal.WRENCH_BY_ATTACHMENT + 18)
@@ -29,26 +34,14 @@ def _alter(testbed: Testbed, element: int, values: Values) -> Testbed:
     return altered_cable(testbed, element, attachment=shifted(place, values))
 
 
-def _columns(signals: Array) -> Array:
-    """Return the first order: a longer cable pulls more."""
-    stiffness = signals[:, CableSignal.STIFFNESS, None]
-    return np.asarray((stiffness * signals[:, _LENGTH])[:, None])
-
-
-def _wrench(signals: Array) -> Array:
-    """Return the change of the wrench at constant tension."""
-    slopes = signals[:, _WRENCH].reshape(-1, 6, 3)
-    return np.asarray(signals[:, EndSignal.TENSION, None, None] * slopes)
-
-
 EFFECT = Effect(
     id="cable_attachment_offset",
     block=Block.CABLE,
     parameters=survey_parameters("attachment", "bar_ned"),
     physics=Physics(alter=_alter),
     signature=Signature(
-        regression=Regression(Channel.TENSION, _columns),
-        partners=(Regression(Channel.WRENCH, _wrench),),
+        regression=Regression(Channel.TENSION, partial(pulling_columns, at=_LENGTH)),
+        partners=(Regression(Channel.WRENCH, partial(wrench_columns, at=_WRENCH)),),
         negligible=healthy("xyz"),
     ),
     description=Description(

@@ -136,10 +136,12 @@ class PublisherBinding:
     def _stranger(self, gid: bytes) -> str:
         found = self._strangers.get(gid)
         if found is None:
-            node = self._publishers().get(gid, _UNKNOWN)
+            node = self._publishers().get(gid, NOT_YET_NAMED)
+            named = node != NOT_YET_NAMED
             found = (
-                f"{self._topic}: a second publisher, of {node}, allowed: that of {self._node} alone"
+                f"{self._topic}: a second publisher, of {node if named else _UNKNOWN}, "
+                f"allowed: that of {self._node} alone"
             )
-            if node != _UNKNOWN and len(self._strangers) < _MOST_STRANGERS:
+            if named and len(self._strangers) < _MOST_STRANGERS:
                 self._strangers[gid] = found
         return found

@@ -32,6 +32,15 @@ def test_it_binds_to_the_only_publisher_whoever_that_is():
     )
 
 
+def test_a_stranger_is_named_once_its_name_is_known():
+    graph = Graph(a="camera", b=NOT_YET_NAMED)
+    made = binding(graph, "camera")
+    assert made.fault(A, 0) is None
+    assert "of an unknown node, allowed" in made.fault(B, 0)
+    graph.nodes[B] = "shouter"
+    assert "of shouter, allowed" in made.fault(B, 0)
+
+
 def test_without_a_publisher_or_with_two_it_is_bound_to_none():
     graph = Graph()
     made = binding(graph)

@@ -28,6 +28,7 @@ from ros_graph import load_ros
 from run_samples import bundle_of
 
 from cspm_control.controllers.torque_profile import TorqueGenerator
+from cspm_msgs_py.graph import RECORDER
 from cspm_msgs_py.recording import Recording, overview
 from cspm_msgs_py.schedule import FORCE_CONTROLLER, PLANT, TENSION, TORQUE_COMMAND
 from cspm_ros.runtime.exit_watchdog import IN_ORDER
@@ -178,7 +179,7 @@ def test_on_a_busy_processor_deadlines_are_missed_and_reported(warm, tmp_path):
     with (
         ExitStack() as stack,
         Graph(warm, bundle, tmp_path, first=False) as graph,
-        Witness(graph.domain, topics_of(bundle, TENSION)) as witness,
+        Witness(graph.domain) as witness,
     ):
         stack.callback(relieve)
         graph.start()
@@ -188,7 +189,10 @@ def test_on_a_busy_processor_deadlines_are_missed_and_reported(warm, tmp_path):
         relieve()
         for node in (PLANT, FORCE_CONTROLLER):
             late(witness, node)
-        witness.until_more(TENSION, 1000)
+        # A bar that nobody held for seconds may end the run by itself.
+        witness.latest.pop(RECORDER, None)
+        plant = graph.processes[PLANT]
+        witness.until(lambda: RECORDER in witness.latest or not plant.is_alive(), RECORDER)
         graph.end()
     reported = timing_of(graph.folder)
     assert reported[PLANT]["deadlines_missed"] > 0

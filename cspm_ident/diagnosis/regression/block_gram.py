@@ -49,9 +49,20 @@ class PlaceGram:
             return self.every_gram
         return silenced(self.every_gram.copy(), self.starts, self.starts)
 
+    def at(self, columns: Index) -> Index:
+        """Return where those of some columns that enter are in the matrices, ascending."""
+        own = np.searchsorted(self.columns, columns)
+        own, wanted = own[own < len(self.columns)], columns[own < len(self.columns)]
+        return np.sort(own[self.columns[own] == wanted])
+
+    def left(self, weights: Array) -> float:
+        """Return Σ residual² for weights of all columns of all residuals, (width,)."""
+        vector = np.append(weights[self.columns], -1.0)
+        return float(vector @ self.whole @ vector)
+
     def delayed(self, columns: Index, block: int) -> PlaceGram:
         """Return the same with some columns acting only from a block on."""
-        own = np.flatnonzero(np.isin(self.columns, columns))
+        own = self.at(columns)
         if not len(own):
             return self
         starts = np.zeros(len(self.whole), dtype=np.intp) if self.starts is None else self.starts
@@ -105,17 +116,13 @@ class BlockGram:
 
     def places_of(self, columns: Index) -> list[Place]:
         """Return the residuals that at least one of some columns acts on."""
-        return [p.place for p in self.places if np.isin(columns, p.columns).any()]
+        return [place.place for place in self.places if len(place.at(columns))]
 
     def left(self, columns: Index, weights: Array) -> dict[Place, float]:
         """Return Σ residual² of each place for some columns' weights."""
-        found = {}
         full = np.zeros(self.width)
         full[columns] = weights
-        for place in self.places:
-            vector = np.append(full[place.columns], -1.0)
-            found[place.place] = float(vector @ place.whole @ vector)
-        return found
+        return {place.place: place.left(full) for place in self.places}
 
     def left_by_block(self, columns: Index, weights: Array) -> dict[Place, Array]:
         """Return Σ residual² of each place's blocks (blocks,) for some columns' weights."""

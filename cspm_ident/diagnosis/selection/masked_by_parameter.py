@@ -76,8 +76,8 @@ def _most(gram: BlockGram, sums: BlockRegression, base: Index, own: Index) -> Pl
 
 def _left(place: PlaceGram, by: Index, own: Index) -> float:
     """Return the summed squares of unit columns in one residual that others do not span."""
-    known = np.flatnonzero(np.isin(place.columns, by))
-    mine = np.flatnonzero(np.isin(place.columns, own))
+    known = place.at(by)
+    mine = place.at(own)
     lengths = np.sqrt(np.diag(place.whole))
     lengths[lengths == 0.0] = 1.0
     gram = place.whole / (lengths * lengths[:, None])

@@ -88,7 +88,7 @@ def _unreported(
     taken = 0.0
     for hypothesis in chosen:
         own = gram.columns_of(hypothesis.candidates)
-        if np.isin(own, place.columns).any():
+        if len(place.at(own)):
             base = _columns(gram, [h for h in chosen if h is not hypothesis])
             taken += max(0.0, sums.gain(base, own).total)
     return sums.thresholds.model_form_error_share * taken

@@ -81,19 +81,19 @@ def _material(
     share: float,
 ) -> float:
     """Return the smallest weight that explains a given share of the squares of one residual."""
-    left = gram.left(base, weights)
-    least = np.inf
+    full, least = np.zeros(gram.width), np.inf
+    full[base] = weights
     for place in gram.places:
-        at = np.flatnonzero(np.isin(place.columns, columns))
+        at = place.at(columns)
         if not len(at):
             continue
-        beside = np.flatnonzero(np.isin(place.columns, base))
+        beside = place.at(base)
         cross = place.whole[np.ix_(beside, at)]
         inverse = np.linalg.pinv(place.whole[np.ix_(beside, beside)], hermitian=True)
         own = float(place.whole[at[0], at[0]] - (cross.T @ inverse @ cross)[0, 0])
         if own > 0.0:
             ratio = share / (1.0 - share)
-            least = min(least, float(np.sqrt(ratio * max(left[place.place], 0.0) / own)))
+            least = min(least, float(np.sqrt(ratio * max(place.left(full), 0.0) / own)))
     return least
 
 

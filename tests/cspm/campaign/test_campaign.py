@@ -213,7 +213,7 @@ def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path, how):
         assert f"interrupted: {kept} of 200 runs are kept; the same command goes on" in out
         assert len(campaigns.rows(folder)) == kept
     first = (folder / "runs.jsonl").read_text().splitlines()[:kept]
-    again = campaigns.begun(file)
+    again = campaigns.begun(file, "--workers", 1)
     until(lambda: campaigns.journalled(folder) > kept, "one more run")
     again.send_signal(signal.SIGINT)
     again.communicate(timeout=PATIENCE_S)

@@ -70,7 +70,7 @@ def test_nobody_at_the_address_is_one_line(tmp_path):
 
 
 def test_a_worker_that_is_killed_costs_its_run_once_more(tmp_path):
-    text = campaigns.SWEEP.replace("to: 4", "to: 40")
+    text = campaigns.SWEEP.replace("to: 4", "to: 15")
     file, folder = campaigns.written(tmp_path, text), tmp_path / "campaigns/sweep"
     with campaigns.Cluster(tmp_path) as cluster:
         first = cluster.worker("--no-nanny")
@@ -81,7 +81,7 @@ def test_a_worker_that_is_killed_costs_its_run_once_more(tmp_path):
         out, _ = program.communicate(timeout=PATIENCE_S)
     assert program.returncode == 0, out
     rows = campaigns.rows(folder)
-    assert [row["seed"] for row in rows] == [*range(1, 41)]
+    assert [row["seed"] for row in rows] == [*range(1, 16)]
     assert {row["status"] for row in rows} == {"done"}
 
 

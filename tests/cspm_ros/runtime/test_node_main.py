@@ -292,17 +292,17 @@ def test_a_signal_ends_every_node_that_waits(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("first", "number"),
+    ("scenario", "nodes", "first", "number"),
     [
-        ("plant", signal.SIGINT),
-        ("recorder", signal.SIGTERM),
+        ("rest", NODES, "plant", signal.SIGINT),
+        ("one_winch", RIG, "recorder", signal.SIGTERM),
     ],
 )
-def test_a_signal_ends_every_node_in_a_run(tmp_path, first, number):
-    parameters = ("scenario:=rest", "overrides:=[duration=3600]", f"folder:={tmp_path}/bag")
-    with ended_in_any_case(by_hand(NODES, *parameters, domain=new_domain())) as processes:
+def test_a_signal_ends_every_node_in_a_run(tmp_path, scenario, nodes, first, number):
+    parameters = (f"scenario:={scenario}", "overrides:=[duration=3600]", f"folder:={tmp_path}/bag")
+    with ended_in_any_case(by_hand(nodes, *parameters, domain=new_domain())) as processes:
         grown(processes["recorder"], tmp_path / "bag", 100_000)
-        for name in (first, *[name for name in reversed(NODES) if name != first]):
+        for name in (first, *[name for name in reversed(nodes) if name != first]):
             # The others of a run whose plant was asked to end are ended by it.
             if first != "plant" or name == first:
                 processes[name].send_signal(number)

@@ -155,10 +155,10 @@ def burners():
 @pytest.mark.slow
 def test_a_busy_machine_changes_nothing(tmp_path):
     bundle = bundle_of("worst_case")
-    run(bundle, tmp_path / "inprocess", steps=800)
+    run(bundle, tmp_path / "inprocess", steps=200)
     with burners():
-        run_graph(bundle, tmp_path / "graph", steps=800, domain_id=new_domain())
-        processes(bundle, tmp_path / "processes", steps=800)
+        run_graph(bundle, tmp_path / "graph", steps=200, domain_id=new_domain())
+        processes(bundle, tmp_path / "processes", steps=200)
     assert_same(tmp_path / "inprocess", tmp_path / "graph")
     assert_same(tmp_path / "inprocess", tmp_path / "processes")
 

@@ -39,11 +39,15 @@ def with_one_number(own: JudgedSearch, model: Model, data: Data) -> tuple[Accept
         model: of its findings.
         data: for fitting and validating models.
     """
+    calibrated = _calibrated(own)
+    beside = {(each.effect, each.elements) for each in calibrated}
     found = [each for each in model.findings if each.status is not Status.NEGLIGIBLE]
-    if (len(found) == 1 and is_number(found[0].hypothesis)) or _is_at_noise(own, Model((), {})):
+    named = [each for each in found if (each.effect, each.elements) not in beside]
+    if len(named) == 1 and is_number(named[0].hypothesis):
+        return None
+    if _is_at_noise(own, Model((), {}) if named else model):
         return None
     before = _left(own, model, data)
-    calibrated = _calibrated(own)
     for hypothesis in _promising(own, found):
         finding = own.search.finding_of(hypothesis, [])
         tested = holdout_tested(own.search.fits, own.judge, [finding, *calibrated])[0]

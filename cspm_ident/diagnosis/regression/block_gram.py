@@ -271,8 +271,10 @@ def _of_place(
         table = _table(equation, own, slices, where)
         blocks = np.flatnonzero(recording == r)
         home = blocks[np.searchsorted(edges[blocks], equation.times, side="right") - 1]
-        for block in np.unique(home):
-            part = table[home == block].reshape(-1, table.shape[2])
+        # Rows are in order of time, so that a block's are next to each other.
+        found, first = np.unique(home, return_index=True)
+        for block, own_rows in zip(found, np.split(table, first[1:]), strict=True):
+            part = own_rows.reshape(-1, table.shape[2])
             grams[block] += part.T @ part
             rows[block] += len(part)
     return PlaceGram(place, columns, grams, grams.sum(axis=0), rows)

@@ -63,6 +63,7 @@ class BlockRegression:
         self._starts: Index = np.zeros(width + 1, dtype=np.intp)
         self._undelayed: BlockRegression | None = None
         self._folds = np.array_split(np.arange(gram.blocks), min(FOLDS, gram.blocks))
+        self._held_out: dict[bytes, Array] = {}
 
     def _of(self, rows: Index, columns: Index) -> Array:
         """Return each block's products of two sets of columns, (blocks, rows, columns)."""
@@ -94,7 +95,7 @@ class BlockRegression:
     def _like(self: _Kind) -> _Kind:
         """Return a regression of the same kind, without Gram matrices."""
         other = object.__new__(type(self))
-        other.thresholds, other._folds = self.thresholds, self._folds
+        other.thresholds, other._folds, other._held_out = self.thresholds, self._folds, {}
         return other
 
     def _alone(self, blocks: Array, lengths: Array) -> BlockRegression:
@@ -236,6 +237,13 @@ class BlockRegression:
 
         The fit uses the blocks outside its fold, except those next to the fold.
         """
+        # One base serves hundreds of candidates.
+        key = np.asarray(columns, dtype=np.intp).tobytes()
+        if key not in self._held_out:
+            self._held_out[key] = self._predicted(columns)
+        return self._held_out[key]
+
+    def _predicted(self, columns: Index) -> Array:
         both = np.append(columns, len(self._starts) - 1)
         parts, out = self._of(both, both), np.zeros(self.blocks)
         whole = self._whole.at(both, both)

@@ -267,11 +267,10 @@ class External:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("processes", ["--one-process", "--process-per-node"])
-def test_a_run_waits_for_it_says_so_starts_and_records(bundle, tmp_path, processes):
+def test_a_run_waits_for_it_says_so_starts_and_records(bundle, tmp_path):
     waits = [word for key in PATIENT for word in ("--set", f"safety.{key}={WAIT}")]
     patient = (*waits, "--duration", "3")
-    with External(tmp_path / "bag", processes, *patient) as run:
+    with External(tmp_path / "bag", *patient) as run:
         run.until(f"waits for {', '.join(MEASURED)}")
         with Process(run.domain, watchdog=WAIT) as driver:
             run.until("all is there")

@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cspm_checks.drive_limit import at_limit
+from cspm_checks.drive_limit import LIMIT
 from cspm_ident.data_look.data_check import DataCheck, check_of
 from cspm_ident.signals.jumps import jumps
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
-
-Array = NDArray[np.float64]
+from cspm_run.run_statistics import torque_limits
+from cspm_run.stability.saturation import saturation_of, saturation_words
 
 # A reading that is held so long while its winch moves, to the last digit, is no reading.
 _HELD_S, _HELD_SAMPLES = 0.2, 20
 # Of the shaft's RMS speed: faster than that a shaft does not stand.
 _MOVING = 0.2
-# A drive that is at its limit so long does not follow; a loop that chatters at it does.
-_SATURATED_S = 0.1
 # Of the time: what lasts shorter moves no estimate by more.
 _SHARE = 0.01
 _PARTS = ("angle", "torque", "tension", "speed")
@@ -66,19 +63,14 @@ def slack_check(measurement: Measurement) -> DataCheck:
 
 
 def saturation_check(measurement: Measurement) -> DataCheck:
-    """Return which drives are at their torque limit, and how long."""
-    found = []
-    for part, name, column in _columns(measurement):
-        cable = next(each for each in measurement.machine.cables if each.name == name)
-        if part != "torque":
-            continue
-        limited = at_limit(column.values[:, 0], cable.torque_limit)
-        share = _lasting(limited, _SATURATED_S, column) / max(measurement.duration, 1e-9)
-        if share > _SHARE:
-            found.append(
-                f"the drive of {name} is at its limit of {cable.torque_limit:.3g} N·m for"
-                f" {100.0 * share:.1f} % of the time"
-            )
+    """Return which drives are at their torque limit, how much of the time, and how."""
+    torque, machine = measurement.torque, measurement.machine
+    words = ""
+    if torque is not None:
+        limits = LIMIT * torque_limits(machine)
+        drives = saturation_of(torque.times, torque.values, limits, machine.cable_names)
+        words = saturation_words(drives, _SHARE)
+    found = [f"at their torque limit: {words}"] if words else []
     remedy = (
         "ask for less, or correct `torque_limit`; a saturated drive reports what it cannot give"
     )
@@ -110,11 +102,3 @@ def _held(column: Samples, measurement: Measurement, name: str) -> float:
     travel = np.abs(np.diff(np.interp(column.times[edges], angle.times, angle.values[:, 0])))
     stuck = long & (travel > _MOVING * rate * apart)
     return float(apart[stuck].sum() / max(measurement.duration, 1e-9))
-
-
-def _lasting(state: NDArray[np.bool_], shortest: float, samples: Samples) -> float:
-    """Return the time [s] in which a state lasts for at least `shortest` [s]."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], state, [False]]).astype(int)))
-    times = samples.times[np.minimum(edges, len(samples.times) - 1)].reshape(-1, 2)
-    apart = times[:, 1] - times[:, 0]
-    return float(apart[apart >= shortest].sum())

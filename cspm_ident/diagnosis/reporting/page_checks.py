@@ -34,7 +34,7 @@ def data_table(data: dict[str, Any]) -> str:
 def saturation_table(found: Diagnosis) -> str:
     """Return which drives were at their torque limit as HTML; empty where none was.
 
-    Touches count that are too short for the check of the data, which names stretches.
+    Touches count that are too rare for the check of the data.
     """
     rows = []
     for each in (*found.searched, *found.held_out):

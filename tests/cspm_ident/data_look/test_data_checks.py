@@ -102,14 +102,18 @@ def test_slack_and_stuck_load_cells_are_named():
     assert constant_check(constant).what == "tension of hoist_1 is constant at 49.05"
 
 
-def test_a_saturated_drive_is_named_and_one_that_chatters_is_not(healthy):
+def test_a_saturated_drive_is_named_and_one_that_chatters_is_said_to(healthy):
     limit = healthy.machine.cables[0].torque_limit
     lasting = changed(healthy, "torque", lambda at, v: put(v, (at > 1.0) & (at < 2.2), limit))
     assert saturation_check(lasting).what == (
-        f"the drive of carriage is at its limit of {limit:.3g} N·m for 10.0 % of the time"
+        "at their torque limit: carriage 10.0 % (stretches, up to 1.2 s)"
     )
     chatters = changed(healthy, "torque", lambda at, v: put(v, np.arange(len(at)) % 3 == 0, limit))
-    assert saturation_check(chatters).ok
+    assert saturation_check(chatters).what == (
+        "at their torque limit: carriage 33.3 % (chatter, at most 1 ms)"
+    )
+    rarely = changed(healthy, "torque", lambda at, v: put(v, np.arange(len(at)) % 200 == 0, limit))
+    assert saturation_check(rarely).ok
 
 
 def test_a_jump_is_named_with_its_instant(healthy):

@@ -12,7 +12,12 @@ from cspm_ident.signals.jumps import jumps
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_run.run_statistics import torque_limits
-from cspm_run.stability.saturation import saturation_of, saturation_words
+from cspm_run.stability.saturation import (
+    STRETCH_S,
+    DriveSaturation,
+    saturation_of,
+    saturation_words,
+)
 
 # A reading that is held so long while its winch moves, to the last digit, is no reading.
 _HELD_S, _HELD_SAMPLES = 0.2, 20
@@ -63,18 +68,25 @@ def slack_check(measurement: Measurement) -> DataCheck:
 
 
 def saturation_check(measurement: Measurement) -> DataCheck:
-    """Return which drives are at their torque limit, how much of the time, and how."""
+    """Return which drives are at their torque limit, and how much of the time.
+
+    A drive that chatters at it follows on average, which is said and is well.
+    """
     torque, machine = measurement.torque, measurement.machine
-    words = ""
+    drives: list[DriveSaturation] = []
     if torque is not None:
         limits = LIMIT * torque_limits(machine)
         drives = saturation_of(torque.times, torque.values, limits, machine.cable_names)
-        words = saturation_words(drives, _SHARE)
-    found = [f"at their torque limit: {words}"] if words else []
+    lasting = saturation_words((each for each in drives if each.longest >= STRETCH_S), _SHARE)
+    touching = saturation_words((each for each in drives if each.longest < STRETCH_S), _SHARE)
+    found = [f"at their torque limit: {lasting}"] if lasting else []
+    well = (
+        f"drives touch their torque limit: {touching}" if touching else "no drive is at its limit"
+    )
     remedy = (
         "ask for less, or correct `torque_limit`; a saturated drive reports what it cannot give"
     )
-    return check_of("saturation", measurement.path, found, "no drive is at its limit", remedy)
+    return check_of("saturation", measurement.path, found, well, remedy)
 
 
 def _columns(measurement: Measurement) -> Iterator[tuple[str, str, Samples]]:

@@ -26,7 +26,7 @@ class Provenance(StrictModel):
     `window` is the time [s] of the recording that was used, `further_windows` those of the further
     recordings; `interval` holds the value with 95 % probability, an end that nothing bounds is
     None. `accuracy` is one standard deviation of the value, in its unit and for each coordinate of
-    a place; a diagnosis takes it for exits and attachments.
+    a place; a diagnosis takes it for the numbers that an effect of the catalogue adds to.
     """
 
     provenance: Literal["thesis", "reconstructed", "fitted", "measured", "datasheet", "published"]

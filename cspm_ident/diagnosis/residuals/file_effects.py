@@ -11,10 +11,18 @@ from dataclasses import replace
 
 from cspm_msgs_py.testbed import EffectEntry, Testbed, TestbedFile
 from cspm_sim.effects import Effect, Elements, catalogue
-from cspm_sim.effects.survey import ACCURACY, surveyed_to
+from cspm_sim.effects.survey import surveyed_to
 
-# Keys of the places that effects move.
-_PLACES = {"cable_exit_offset": "exit", "cable_attachment_offset": "attachment"}
+# The numbers of a file that effects add to, `{i}` for each cable.
+_NUMBERS = {
+    "cable_exit_offset": "cables[{i}].exit",
+    "cable_attachment_offset": "cables[{i}].attachment",
+    "cable_length_offset": "cables[{i}].offset_length",
+    "winch_drum_radius": "cables[{i}].drum_radius",
+    "winch_inertia": "cables[{i}].rotor_inertia",
+    "bar_mass": "bar.mass",
+    "bar_com": "bar.com",
+}
 # Noise moves the estimate of an effect that is gone below the file's value.
 _SLACK = 1.05
 
@@ -25,14 +33,14 @@ def with_file_bounds(effects: Sequence[Effect], machine: Testbed) -> list[Effect
 
 
 def with_file_accuracies(effects: Sequence[Effect], file: TestbedFile) -> list[Effect]:
-    """Return effects with the accuracies that a file states of the places that they move.
+    """Return effects with the accuracies that a file states of the numbers that they add to.
 
-    Without those of places that it knows exactly. Of several the largest counts for all.
+    Without those of numbers that it knows exactly. Of several cables the largest counts for all,
+    and none where one has neither a stated accuracy nor a usual one.
     """
     found = []
     for effect in effects:
-        key = _PLACES.get(effect.id)
-        stated = _stated(file, key) if key else []
+        stated = _stated(file, effect) if effect.id in _NUMBERS else []
         if not stated:
             found.append(effect)
         elif max(stated) > 0.0:
@@ -40,13 +48,15 @@ def with_file_accuracies(effects: Sequence[Effect], file: TestbedFile) -> list[E
     return found
 
 
-def _stated(file: TestbedFile, key: str) -> list[float]:
-    """Return the accuracies of a place of all cables, the usual one where a cable has none."""
-    paths = (f"cables[{i}].{key}" for i in range(len(file.testbed.cables)))
+def _stated(file: TestbedFile, effect: Effect) -> list[float]:
+    """Return the accuracies of a number of all cables, the usual one where a cable has none."""
+    usual = effect.linear[0].usual
+    paths = {_NUMBERS[effect.id].format(i=i) for i in range(len(file.testbed.cables))}
     known = [file.provenance[path].accuracy if path in file.provenance else None for path in paths]
     if all(each is None for each in known):
         return []
-    return [ACCURACY if each is None else each for each in known]
+    found = [usual if each is None else each for each in known]
+    return [] if None in found else [each for each in found if each is not None]
 
 
 def may_be_less(effect: Effect) -> bool:

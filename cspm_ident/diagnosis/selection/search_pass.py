@@ -13,6 +13,7 @@ from cspm_ident.diagnosis.regression.block_regression import FOLDS
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.regression.time_constants import covered_within
 from cspm_ident.diagnosis.residuals.data_split import first_part, last_part, span_of
+from cspm_ident.diagnosis.residuals.file_effects import with_file_accuracies
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
 from cspm_ident.diagnosis.residuals.machine_scales import scaled, scales_of
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
@@ -131,7 +132,9 @@ def _search_pass(
     searched, held_out = recordings
     longest = max(m.duration for m in searched)
     scales, knots = scales_of(searched), Knots()
-    visible = [covered_within(scaled(e, scales), longest) for e in effects]
+    # What a file states is in its own units, whatever the machine's scale.
+    stated = with_file_accuracies([scaled(e, scales) for e in effects], searched[0].testbed)
+    visible = [covered_within(e, longest) for e in stated]
 
     def equations(measurements: Sequence[Measurement]) -> Parts:
         return [

@@ -78,3 +78,35 @@ def test_an_attachment_is_distinguished_from_a_survey_of_all_ends(tmp_path):
     low, high = finding.parameters["x"].ci95
     assert finding.effect == "cable_attachment_offset"
     assert low <= 0.01 <= high
+
+
+@pytest.fixture(scope="module")
+def heavier(tmp_path_factory):
+    """A winch whose rotor has 1.76 g·m² more than its file says, and its recording."""
+    folder, scenario = tmp_path_factory.mktemp("heavier"), cspm.load_scenario("one_winch")
+    machine = scenario.testbed.with_parameter("cables.surge.rotor_inertia", 2e-3)
+    run = cspm.simulate(scenario, testbed=machine, seed=4, duration=15.0)
+    return run.save(folder / "recorded"), scenario.testbed.text
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "verdict", "named", "calibrated"),
+    [
+        ("", "parameter", ["winch_inertia"], []),
+        (", accuracy: 1.0e-3", "consistent", [], ["winch_inertia"]),
+        (", accuracy: 1.0e-4", "parameter", ["winch_inertia"], []),
+    ],
+)
+def test_a_number_within_the_accuracy_that_its_file_states_is_no_fault(
+    tmp_path, heavier, accuracy, verdict, named, calibrated
+):
+    recording, text = heavier
+    stated = "rotor_inertia: {value: 2.4e-4, provenance: reconstructed"
+    assert stated in text
+    (tmp_path / "machine.yaml").write_text(text.replace(stated, stated + accuracy))
+    found = cspm.diagnose(recording, testbed=tmp_path / "machine.yaml", closed_loop=False)
+    assert found.verdict == verdict
+    assert [each.effect for each in found.findings] == named
+    assert [each["effect"] for each in found.data["calibrated"]] == calibrated
+    for each in found.data["calibrated"]:
+        assert each["value"] == pytest.approx(1.76e-3, rel=0.01)

@@ -138,6 +138,18 @@ def test_a_file_says_how_well_its_places_are_known(places, accuracy):
         assert not each.is_negligible({"x": 0.0, "y": 0.0, "z": -3.8 * accuracy})
 
 
+def test_a_number_without_a_usual_accuracy_needs_one_of_every_cable():
+    content = MACHINE.model_dump(mode="json", exclude_none=True, by_alias=True)
+    effect = catalogue()["winch_inertia"]
+    usual = []
+    for cable in content["cables"]:
+        value = cable["rotor_inertia"]
+        cable["rotor_inertia"] = {"value": value, "provenance": "measured", "accuracy": 1e-6}
+        (found,) = with_file_accuracies([effect], parse_testbed(dump_yaml(content), "stated"))
+        usual.append(found.linear[0].usual)
+    assert usual == [None] * (len(usual) - 1) + [1e-6]
+
+
 def test_an_accuracy_is_never_negative():
     with pytest.raises(InputError, match=r"cables\[0\].exit: accuracy"):
         surveyed({"accuracy": -1e-3})

@@ -43,12 +43,21 @@ class SensorFault:
             return 0.0
         return sense.lateness(time, self._parameters)
 
-    def reading(self, values: Array) -> Array:
-        """Return the quantities as the faulty sensor takes them in."""
-        sense = self.action.effect.physics.sense
-        if sense is None or sense.reading is None:
-            return values
-        return sense.reading(values, self.action.element, self._parameters)
+    def reading(self, time: float, true: Array, values: Array) -> Array:
+        """Return the quantities as the faulty sensor takes them in.
+
+        Args:
+            time: since the run's start [s].
+            true: the quantities.
+            values: as faults before this one have them.
+        """
+        sense, element = self.action.effect.physics.sense, self.action.element
+        if sense is not None and sense.reading is not None:
+            values = sense.reading(values, element, self._parameters)
+        if sense is not None and sense.added is not None:
+            values = values.copy()
+            values[element] += sense.added(time, true, element, self._parameters)
+        return values
 
     @property
     def _parameters(self) -> Array:

@@ -125,9 +125,10 @@ class SensorModel:
             for fault in self._faults:
                 times[fault.read] -= fault.lateness(time)
             values = self._past.at(times)
+        read = values
         for fault in self._faults:
-            values = fault.reading(values)
-        return values
+            read = fault.reading(time, values, read)
+        return read
 
     def _sample(self, values: Array) -> Array:
         index = self.drawn % _DRAWN_AT_ONCE

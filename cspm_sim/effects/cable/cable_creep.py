@@ -89,7 +89,7 @@ EFFECT = Effect(
         shows=(
             "tension at fixed length falls slowly after a load step, and recovers after unloading"
         ),
-        confounded_with=("cable_hysteresis", "cable_stiffness"),
+        confounded_with=("cable_hysteresis", "cable_stiffness", "tension_drift"),
         separating_experiment="hold for several time constants after a step of load up, then down",
         reference=(
             "Findley, Lai, Onaran, Creep and Relaxation, 1976: a Kelvin-Voigt element in series"

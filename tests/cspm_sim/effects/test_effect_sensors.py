@@ -73,6 +73,14 @@ def test_bias_and_gain_change_one_cable_s_reading():
     assert sensor_faults(testbed, "/winches/state") == []
 
 
+def test_a_drift_grows_from_the_run_s_start_in_one_cell():
+    testbed = machine(entry("tension_drift", ["c2"], rate=0.5), entry("tension_bias", bias=1.0))
+    rows = readings(sensor(testbed, "/cables/tension"), np.full((2001, 8), 10.0))
+    for stamp in (0, 400_000_000, 2_000_000_000):
+        expected = [11.0 + 0.5e-9 * stamp * (i == 2) for i in range(8)]
+        assert rows[stamp] == pytest.approx(expected, rel=1e-14)
+
+
 def test_an_encoder_s_scale_is_in_angle_and_speed_not_in_torque():
     testbed = machine(entry("encoder_scale", ["c1"], scale=1.02))
     values = np.arange(1.0, 25.0)
@@ -251,6 +259,8 @@ def test_columns_are_what_the_reading_has_too_much(effect):
     read = np.vstack([truth(t - old) for t, old in zip(times, late, strict=True)])
     if sense.reading:
         read = np.array([sense.reading(row, 0, parameters) for row in read])
+    if sense.added:
+        read[:, 0] += [sense.added(t, truth(t)[0], 0, parameters) for t in times]
     left = read - truth(times)
     if len(effect.regressors(np.zeros((1, 13)))[0]) == 6:
         signals = np.zeros((50, 13))

@@ -37,7 +37,7 @@ UNITS = {
         "kg/m",
         "kg·m²",
     ),
-    *("m", "rad", "rad/s", "kg", "s", "Hz", "N", "1"),
+    *("m", "rad", "rad/s", "kg", "s", "Hz", "N", "N/s", "1"),
 }
 WORDS = ("friction", "damping", "drag")
 # A difference between two directions: what takes energy is the friction beside it.
@@ -87,6 +87,7 @@ CONTRACT = {
     "encoder_scale": "scale",
     "clock_skew": "skew",
     "tension_delay": "delay",
+    "tension_drift": "rate",
 }
 # What kernels may change, by hook.
 OUTPUTS = {

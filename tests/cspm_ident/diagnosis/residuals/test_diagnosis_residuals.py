@@ -84,9 +84,10 @@ def test_cables_pull_the_frame_towards_the_bar(measurement):
 @pytest.mark.parametrize(
     ("name", "element", "samples", "change"),
     [
-        ("tension_gain", "surge_1", "tension", lambda v: 0.002 * v),
-        ("tension_bias", "hoist_2", "tension", lambda v: 0.002 + 0.0 * v),
-        ("encoder_scale", "sway_3", "angle", lambda v: 1e-5 * v),
+        ("tension_gain", "surge_1", "tension", lambda t, v, i: 0.002 * v[:, i]),
+        ("tension_bias", "hoist_2", "tension", lambda t, v, i: 0.002),
+        ("tension_drift", "sway_2", "tension", lambda t, v, i: 0.002 * t),
+        ("encoder_scale", "sway_3", "angle", lambda t, v, i: 1e-5 * v[:, i]),
     ],
 )
 def test_a_wrong_reading_leaves_its_columns(measurement, equations, name, element, samples, change):
@@ -95,7 +96,7 @@ def test_a_wrong_reading_leaves_its_columns(measurement, equations, name, elemen
     i = measurement.machine.cable_names.index(element)
     read = getattr(measurement, samples)
     values = read.values.copy()
-    values[:, i] += change(values[:, i])
+    values[:, i] += change(read.times, read.values, i)
     moved = by_place(measurement.with_samples(samples, Samples(read.times, values)), [])
     candidate = Candidate(catalogue()[name], element)
     reached = {Place(Channel.TENSION, element)}

@@ -92,6 +92,7 @@ class ReadingSignal(IntEnum):
     TIME = 0
     VALUE = 1
     RATE = 2
+    OTHERS = 3  # mean of the sensor's other readings of this kind
 
 
 class PoseSignal(IntEnum):

@@ -21,6 +21,7 @@ from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, elements
 from cspm_ident.diagnosis.residuals.residual_equation import AT_ONCE, Equation
 from cspm_ident.diagnosis.residuals.residual_window import quiet_window
 from cspm_ident.diagnosis.residuals.sensor_readings import (
+    mean_of_others,
     moving,
     pose_rows,
     reading_rows,
@@ -359,7 +360,8 @@ class _Stretch:
         signals = self._signals
         readings = signals.tensions if topic == TENSION else signals.angles
         rescaled = effect.signature.rescales * self._here.tension_residuals[:, i]
-        change = effect.regressors(reading_rows(signals.times, readings[:, i] - rescaled))[:, 0, 0]
+        own, others = readings[:, i] - rescaled, mean_of_others(readings, i)
+        change = effect.regressors(reading_rows(signals.times, own, others))[:, 0, 0]
         step = small_step(change)
         changed = readings.copy()
         changed[:, i] += step * change

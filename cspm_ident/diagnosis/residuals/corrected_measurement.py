@@ -10,7 +10,11 @@ from scipy.interpolate import CubicSpline
 
 from cspm_ident.diagnosis.residuals.file_effects import joined_entries, of_all_cells
 from cspm_ident.diagnosis.residuals.regressors import Candidate
-from cspm_ident.diagnosis.residuals.sensor_readings import pose_rows, reading_rows
+from cspm_ident.diagnosis.residuals.sensor_readings import (
+    mean_of_others,
+    pose_rows,
+    reading_rows,
+)
 from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.errors import InputError
@@ -147,8 +151,8 @@ def _true_joint(measurement: Measurement, action: Action, kind: str) -> Measurem
     if samples is None:
         return measurement
     i, weights = action.element, action.effect.weights(action.values)
-    values = samples.values.copy()
+    values, others = samples.values.copy(), mean_of_others(samples.values, i)
     for _ in range(_FIXED_POINTS):
-        rows = reading_rows(samples.times, values[:, i])
+        rows = reading_rows(samples.times, values[:, i], others)
         values[:, i] = samples.values[:, i] - action.effect.regressors(rows)[:, 0] @ weights
     return measurement.with_samples(kind, Samples(samples.times, values))

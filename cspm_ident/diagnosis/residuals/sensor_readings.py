@@ -13,13 +13,23 @@ from cspm_sim.effects.signals import ReadingSignal
 Array = NDArray[np.float64]
 
 
-def reading_rows(times: Array, values: Array) -> Array:
-    """Return `ReadingSignal` columns of readings (k,) at times (k,) [s]."""
+def reading_rows(times: Array, values: Array, others: Array | float = 0.0) -> Array:
+    """Return `ReadingSignal` columns of readings (k,) at times (k,) [s].
+
+    `others` is the mean of the sensor's other readings, (k,) as well; see `mean_of_others`.
+    """
     rows = np.zeros((len(times), len(ReadingSignal)))
     rows[:, ReadingSignal.TIME] = times
     rows[:, ReadingSignal.VALUE] = values
     rows[:, ReadingSignal.RATE] = np.gradient(values, times)
+    rows[:, ReadingSignal.OTHERS] = others
     return rows
+
+
+def mean_of_others(readings: Array, i: int) -> Array:
+    """Return the mean of readings (k, n) without column i, (k,); what is missing counts as 0."""
+    others = np.nan_to_num(np.delete(readings, i, axis=1))
+    return np.asarray(others.sum(axis=1) / max(1, others.shape[1]))
 
 
 def pose_rows(times: Array, poses: Array, rates: Array) -> Array:

@@ -11,11 +11,12 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from cspm_ident.diagnosis.residuals.free_shapes import Driver, Knots
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place, elements_of, shapes_of
 from cspm_ident.diagnosis.residuals.residual_equation import AT_ONCE, Equation
-from cspm_ident.diagnosis.residuals.sensor_readings import reading_rows
+from cspm_ident.diagnosis.residuals.sensor_readings import mean_of_others, reading_rows
 from cspm_ident.diagnosis.thresholds import DEFAULT_THRESHOLDS, Thresholds
 from cspm_ident.side_by_side import side_by_side
 from cspm_ident.signals.measurement import TENSION, WINCHES, Measurement
 from cspm_ident.signals.samples import Samples
+from cspm_ident.signals.timeline import joined
 from cspm_ident.winch.recording import moved_along, signal_rows, winch_signals
 from cspm_ident.winch.weak_form import HALF_WIDTH_S, make_window, weigh
 from cspm_msgs_py.errors import InputError
@@ -89,7 +90,17 @@ def _tables(measurement: Measurement, i: int, thresholds: Thresholds) -> Iterato
             continue
         sensors = (WINCHES,) if signals.tension is None else (WINCHES, TENSION)
         lost = _lost(signals.torque, measurement.torque_age, times)
-        yield _Shaft(rows, cable, half, times, lost, sensors, thresholds.reversal_speed_share)
+        others = _others(measurement.tension, i, times)
+        share = thresholds.reversal_speed_share
+        yield _Shaft(rows, cable, half, times, lost, sensors, share, others)
+
+
+def _others(tension: Samples | None, i: int, times: Array) -> Array:
+    """Return the mean tension that the other load cells read, zeros without any, (k,) [N]."""
+    if tension is None:
+        return np.zeros(len(times))
+    mean = mean_of_others(tension.values, i)[:, None]
+    return joined(tension.of_others(mean), times)[:, 0]
 
 
 def may_reverse(speeds: Array, share: float, width: int) -> NDArray[np.bool_]:
@@ -144,7 +155,9 @@ class _Shaft:
         lost: NDArray[np.bool_],
         sensors: tuple[str, ...],
         still_share: float,
+        others: Array,
     ) -> None:
+        self._others = others
         self._sensors, inertia, name = sensors, winch.rotor_inertia, winch.name
         self._rows, self._inertia, self._name = rows, inertia, name
         self._step = float(times[1] - times[0])
@@ -211,7 +224,9 @@ class _Shaft:
         """Return a sensor fault's change of the residual, by the reading's part in it."""
         tension = effect.physics.sense is not None and effect.physics.sense.topics[0] == TENSION
         source = WinchSignal.TENSION if tension else WinchSignal.ANGLE
-        reading = reading_rows(self._rows[:, WinchSignal.TIME], self._rows[:, source])
+        others = self._others if tension else 0.0
+        times = self._rows[:, WinchSignal.TIME]
+        reading = reading_rows(times, self._rows[:, source], others)
         change = effect.regressors(reading)[:, 0]
         if tension:
             return self._averaged(-self._rows[:, WinchSignal.RADIUS, None] * change)

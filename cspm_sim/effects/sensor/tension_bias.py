@@ -36,7 +36,12 @@ EFFECT = Effect(
         noun="a zero offset",
         equation="measured tension = tension + bias",
         shows="the same constant in torque, tension and wrench residuals of one cable",
-        confounded_with=("winch_torque_offset", "bar_constant_wrench", "tension_drift"),
+        confounded_with=(
+            "winch_torque_offset",
+            "bar_constant_wrench",
+            "tension_crosstalk",
+            "tension_drift",
+        ),
         separating_experiment="read the cell with its cable slack, and at three tension levels",
         reference="zero balance of strain-gauge load cells, OIML R 60",
     ),

@@ -1,15 +1,32 @@
 """Faults of load cells: named alone, with an interval that holds what was planted."""
 
 import pytest
+import yaml
 
 import cspm
+from cspm_run.library import find_scenario
 
 pytestmark = [pytest.mark.compiled, pytest.mark.slow]
 
 
-def diagnosed(folder, *effects):
+@pytest.fixture(scope="module")
+def two_winches(tmp_path_factory):
+    """The rig of one winch twice, each with its own sines, so that two cells are neighbours."""
+    source, folder = find_scenario("one_winch"), tmp_path_factory.mktemp("rig")
+    content = yaml.safe_load(source.read_text(encoding="utf-8"))
+    machine = yaml.safe_load((source.parent / content["testbed"]).read_text(encoding="utf-8"))
+    (cable,), first = machine["cables"], content["control"]["torque"]["surge"]
+    machine["cables"].append({**cable, "name": "other"})
+    sines = [{**sine, "frequency": 0.7 * sine["frequency"]} for sine in first["sines"]]
+    content["control"]["torque"]["other"] = {"offset": 0.9, "sines": sines}
+    content["testbed"] = "rig.yaml"
+    for name, each in (("rig", machine), ("motion", content)):
+        (folder / f"{name}.yaml").write_text(yaml.safe_dump(each), encoding="utf-8")
+    return cspm.load_scenario(folder / "motion.yaml")
+
+
+def diagnosed(folder, scenario, *effects):
     """A rig with faults, each an effect, its element and its numbers, by its file without them."""
-    scenario = cspm.load_scenario("one_winch")
     machine = scenario.testbed
     for effect, element, numbers in effects:
         machine = machine.with_effect(effect, element, **numbers)
@@ -18,19 +35,19 @@ def diagnosed(folder, *effects):
     return cspm.diagnose(recording, testbed=scenario.testbed, closed_loop=False)
 
 
-def test_healthy_load_cells_have_no_fault(tmp_path):
-    found = diagnosed(tmp_path)
+def test_healthy_load_cells_have_no_fault(tmp_path, two_winches):
+    found = diagnosed(tmp_path, two_winches)
     assert (found.verdict, found.findings) == ("consistent", ())
 
 
 @pytest.mark.parametrize(
-    ("effect", "element", "numbers"),
-    [("tension_drift", "surge", {"rate": 0.01})],
-    ids=lambda each: each if isinstance(each, str) else "",
+    ("effect", "numbers"),
+    [("tension_drift", {"rate": 0.01}), ("tension_crosstalk", {"share": 0.02})],
+    ids=["drift", "crosstalk"],
 )
-def test_a_fault_of_a_load_cell_is_named_alone(tmp_path, effect, element, numbers):
-    (finding,) = diagnosed(tmp_path, (effect, element, numbers)).findings
-    assert (finding.effect, list(finding.elements)) == (effect, [element])
+def test_a_fault_of_a_load_cell_is_named_alone(tmp_path, two_winches, effect, numbers):
+    (finding,) = diagnosed(tmp_path, two_winches, (effect, "surge", numbers)).findings
+    assert (finding.effect, list(finding.elements)) == (effect, ["surge"])
     for name, truth in numbers.items():
         low, high = finding.parameters[name].ci95
         assert low <= truth <= high

@@ -81,6 +81,19 @@ def test_a_drift_grows_from_the_run_s_start_in_one_cell():
         assert rows[stamp] == pytest.approx(expected, rel=1e-14)
 
 
+def test_crosstalk_is_a_share_of_the_mean_of_all_others_whatever_their_own_crosstalk():
+    testbed = machine(entry("tension_crosstalk", share=0.07))
+    values = np.arange(8.0) ** 2
+    row = readings(sensor(testbed, "/cables/tension"), [values])[0]
+    assert row == pytest.approx(values + 0.01 * (values.sum() - values), rel=1e-14)
+
+
+def test_a_single_load_cell_has_no_neighbours():
+    rig = build({**rig_content(), "effects": [entry("tension_crosstalk", share=0.07)]})
+    (row,) = readings(sensor(rig, "/cables/tension"), [np.array([12.0])]).values()
+    assert row == pytest.approx([12.0])
+
+
 def test_an_encoder_s_scale_is_in_angle_and_speed_not_in_torque():
     testbed = machine(entry("encoder_scale", ["c1"], scale=1.02))
     values = np.arange(1.0, 25.0)
@@ -268,7 +281,8 @@ def test_columns_are_what_the_reading_has_too_much(effect):
         signals[:, PoseSignal.POSE : PoseSignal.POSE + 6] = truth(times)
         signals[:, PoseSignal.RATE : PoseSignal.RATE + 6] = rates
     else:
-        signals = np.column_stack([times, truth(times)[:, 0], rates[:, 0]])
+        own, *others = truth(times).T
+        signals = np.column_stack([times, own, rates[:, 0], np.mean(others, axis=0)])
         left = left[:, :1]
     model = effect.regressors(signals) @ effect.weights(values)
     assert np.abs(left).max() > 1e-7

@@ -86,6 +86,7 @@ CONTRACT = {
     "pose_offset": "surge sway heave roll pitch yaw",
     "encoder_scale": "scale",
     "clock_skew": "skew",
+    "tension_crosstalk": "share",
     "tension_delay": "delay",
     "tension_drift": "rate",
 }

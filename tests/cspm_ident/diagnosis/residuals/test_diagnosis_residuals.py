@@ -87,6 +87,12 @@ def test_cables_pull_the_frame_towards_the_bar(measurement):
         ("tension_gain", "surge_1", "tension", lambda t, v, i: 0.002 * v[:, i]),
         ("tension_bias", "hoist_2", "tension", lambda t, v, i: 0.002),
         ("tension_drift", "sway_2", "tension", lambda t, v, i: 0.002 * t),
+        (
+            "tension_crosstalk",
+            "sway_4",
+            "tension",
+            lambda t, v, i: 0.002 * np.delete(v, i, axis=1).mean(axis=1),
+        ),
         ("encoder_scale", "sway_3", "angle", lambda t, v, i: 1e-5 * v[:, i]),
     ],
 )

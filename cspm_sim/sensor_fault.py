@@ -43,6 +43,14 @@ class SensorFault:
             return 0.0
         return sense.lateness(time, self._parameters)
 
+    @property
+    def time_constant(self) -> float:
+        """Of the low pass that the quantities in `read` pass [s]; 0: of none."""
+        sense = self.action.effect.physics.sense
+        if sense is None or sense.time_constant is None:
+            return 0.0
+        return sense.time_constant(self._parameters)
+
     def reading(self, time: float, true: Array, values: Array) -> Array:
         """Return the quantities as the faulty sensor takes them in.
 
@@ -86,6 +94,31 @@ class Past:
         noted, values = (np.array(each) for each in zip(*rows, strict=True))
         columns = zip(times, values.T, strict=True)
         return np.array([np.interp(time, noted, own) for time, own in columns])
+
+
+class LowPass:
+    """A low pass of first order, exact where its input is straight between instants.
+
+    It begins at rest.
+    """
+
+    def __init__(self, fault: SensorFault) -> None:
+        """Take the fault, whose time constant is above 0."""
+        self._read, self._time_constant = fault.read, fault.time_constant
+        self._before: tuple[float, Array, Array] | None = None
+
+    def passed(self, time: float, values: Array) -> Array:
+        """Return the quantities of the present [s], later than all before, as they pass."""
+        out = values.copy()
+        if self._before is not None:
+            then, given, lagging = self._before
+            step, slow = time - then, self._time_constant
+            behind = slow * (values - given)[self._read] / step
+            kept = np.exp(-step / slow)
+            rest = lagging - given[self._read] + behind
+            out[self._read] = values[self._read] - behind + rest * kept
+        self._before = time, values.copy(), out[self._read].copy()
+        return out
 
 
 def sensor_faults(testbed: Testbed, topic: str) -> list[SensorFault]:

@@ -14,7 +14,7 @@ from cspm_model.kernels.rows import corrupt, pose_row
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.sensor_spec import Sensor, quantities
 from cspm_msgs_py.topics import Topic
-from cspm_sim.sensor_fault import Past, SensorFault
+from cspm_sim.sensor_fault import LowPass, Past, SensorFault
 
 Array = NDArray[np.float64]
 
@@ -94,10 +94,13 @@ class SensorModel:
         self.drawn = 0
         self.underway: deque[tuple[int, int, Array]] = deque()
         self._faults = tuple(faults)
+        self._low_passes = [LowPass(fault) for fault in faults if fault.time_constant > 0.0]
         self._past = Past() if any(fault.is_late for fault in faults) else None
 
     def observe(self, step: int, now_ns: int, values: Array) -> tuple[int, Array] | None:
         """Take a sample if one is due; return stamp [ns] and row of one that arrives, if any."""
+        for low_pass in self._low_passes:
+            values = low_pass.passed(now_ns * 1e-9, values)
         if self._past is not None:
             self._past.note(now_ns * 1e-9, values)
         if step % self.divider == 0:

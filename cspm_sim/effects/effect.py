@@ -131,6 +131,8 @@ class Sense:
             before noise; of a pose x y z φ θ ψ, of joints by kind and cable.
         lateness: `lateness(time, parameters)`: by how much the reading is older than its stamp says
             [s].
+        time_constant: `time_constant(parameters)`: of a low pass of first order that the quantities
+            pass before anything else [s].
         added: `added(time, values, element, parameters)`: what the element's reading has too much
             at a time since the run's start [s] where the sensor's quantities are `values`.
         one_system: whether one system reads all elements, so that what it does to one it is likely
@@ -140,6 +142,7 @@ class Sense:
     topics: tuple[str, ...]
     reading: Callable[[Array, int, Array], Array] | None = None
     lateness: Callable[[float, Array], float] | None = None
+    time_constant: Callable[[Array], float] | None = None
     added: Callable[[float, Array, int, Array], float] | None = None
     one_system: bool = False
 

@@ -117,6 +117,7 @@ def test_a_run_that_diverges_ends_at_the_same_step_with_the_same_words():
         ("tension_bias", ("sway_3",), {"bias": 0.4}),
         ("tension_drift", ("sway_3",), {"rate": 0.8}),
         ("tension_crosstalk", (), {"share": 0.05}),
+        ("tension_lag", ("load_cells",), {"time_constant": 0.004}),
         ("pose_delay", ("bar",), {"delay": 0.0123}),
         ("winch_torque_lag", (), {"time_constant": 0.01}),
         ("winch_backlash", (), {"width": 0.01}),

@@ -307,8 +307,9 @@ def unusual(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> float
 
 
 def is_timing(effect: Effect) -> bool:
-    """Return whether an effect makes readings older than their stamps."""
-    return effect.physics.sense is not None and effect.physics.sense.lateness is not None
+    """Return whether an effect makes readings older than their stamps, or slower."""
+    sense = effect.physics.sense
+    return sense is not None and (sense.lateness or sense.time_constant) is not None
 
 
 def is_surveyed(effect: Effect) -> bool:

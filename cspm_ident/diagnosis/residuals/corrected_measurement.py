@@ -150,9 +150,16 @@ def _true_joint(measurement: Measurement, action: Action, kind: str) -> Measurem
     samples: Samples | None = getattr(measurement, kind)
     if samples is None:
         return measurement
-    i, weights = action.element, action.effect.weights(action.values)
+    effect, i, weights = action.effect, action.element, action.effect.weights(action.values)
+    assert effect.physics.sense is not None
+    if effect.physics.sense.time_constant is not None:
+        # By the rate of the reading itself, which is exact.
+        own = slice(i, i + 1) if action.name in measurement.machine.cable_names else slice(None)
+        values = samples.values.copy()
+        values[:, own] += weights[0] * np.gradient(values[:, own], samples.times, axis=0)
+        return measurement.with_samples(kind, Samples(samples.times, values))
     values, others = samples.values.copy(), mean_of_others(samples.values, i)
     for _ in range(_FIXED_POINTS):
         rows = reading_rows(samples.times, values[:, i], others)
-        values[:, i] = samples.values[:, i] - action.effect.regressors(rows)[:, 0] @ weights
+        values[:, i] = samples.values[:, i] - effect.regressors(rows)[:, 0] @ weights
     return measurement.with_samples(kind, Samples(samples.times, values))

@@ -89,6 +89,12 @@ class Search:
         other._begin(hypothesis)
         return other
 
+    def without(self, candidates: Sequence[Candidate]) -> Search:
+        """Return the same search, with candidates fewer."""
+        other = copy(self)
+        other._look_for([c for c in self._effects if c not in candidates])
+        return other
+
     def run(self) -> SearchResult:
         """Select effects one by one, each on all elements where it is significant."""
         chosen = self._chosen()

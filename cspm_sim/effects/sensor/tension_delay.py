@@ -45,7 +45,12 @@ EFFECT = Effect(
             "torque residual of each winch in proportion to the rate of its tension, as of viscous"
             " friction where tension follows the angle; a damper of −stiffness·delay in all cables"
         ),
-        confounded_with=("winch_viscous_friction", "cable_axial_damping", "pose_delay"),
+        confounded_with=(
+            "winch_viscous_friction",
+            "cable_axial_damping",
+            "pose_delay",
+            "tension_lag",
+        ),
         separating_experiment="sweep the frequency with the winch locked: friction is silent then",
         reference="group delay of a carrier-frequency amplifier's low-pass filter",
     ),

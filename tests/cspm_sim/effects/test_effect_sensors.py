@@ -159,6 +159,25 @@ def test_one_late_load_cell_leaves_the_others_in_time():
     assert rows[30_000_000] == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.parametrize(("elements", "slow"), [(["load_cells"], range(8)), (["c1"], [1])])
+def test_a_low_pass_follows_a_ramp_late_and_a_sine_smaller(elements, slow):
+    constant, times = 0.01, 1e-3 * np.arange(1001)
+    fast = 2 * np.pi * 20.0
+    values = np.outer(np.where(times < 0.5, times, 0.5), np.ones(8))
+    values[:, 7] = 1.0 - np.cos(fast * times)
+    testbed = machine(entry("tension_lag", elements, time_constant=constant))
+    rows = readings(sensor(testbed, "/cables/tension"), values)
+    read = np.array([rows[k * 1_000_000] for k in range(1001)])
+    ramp = 0.3 - constant * (1.0 - np.exp(-0.3 / constant))
+    assert read[300, 1] == pytest.approx(ramp, abs=1e-12)
+    assert read[1000, 1] == pytest.approx(0.5, abs=1e-12)
+    others = [i for i in range(8) if i not in slow]
+    assert (read[:, others] == values[:, others]).all()
+    if 7 in slow:
+        swing = np.ptp(read[800:, 7]) / 2
+        assert swing == pytest.approx(1.0 / np.hypot(1.0, fast * constant), rel=2e-3)
+
+
 def test_a_late_pose_and_a_delayed_message_add_up():
     """The message's own delay moves its arrival; the effect its content."""
     testbed = machine(entry("pose_delay", ["bar"], delay=0.004))
@@ -272,6 +291,8 @@ def test_columns_are_what_the_reading_has_too_much(effect):
     read = np.vstack([truth(t - old) for t, old in zip(times, late, strict=True)])
     if sense.reading:
         read = np.array([sense.reading(row, 0, parameters) for row in read])
+    if sense.time_constant:
+        read = read - sense.time_constant(parameters) * rates
     if sense.added:
         read[:, 0] += [sense.added(t, truth(t)[0], 0, parameters) for t in times]
     left = read - truth(times)

@@ -89,6 +89,7 @@ CONTRACT = {
     "tension_crosstalk": "share",
     "tension_delay": "delay",
     "tension_drift": "rate",
+    "tension_lag": "time_constant",
 }
 # What kernels may change, by hook.
 OUTPUTS = {

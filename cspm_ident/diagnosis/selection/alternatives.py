@@ -26,8 +26,10 @@ def alternatives_of(
 ) -> Iterator[Rival]:
     """Yield hypotheses that explain the same nearly as well as a selected one, in its place.
 
-    A difference within the model-form error does not separate two hypotheses. Each further
-    parameter counts as in Schwarz's criterion, with blocks as observations.
+    What separates two hypotheses is the difference of what they leave, block by block, and not how
+    large it is in all: a few blocks may hold half of a gain by chance. A difference within the
+    model-form error does not separate them. Each further parameter counts as in Schwarz's
+    criterion, with blocks as observations.
 
     Args:
         fits: of all columns.
@@ -52,7 +54,7 @@ def alternatives_of(
             continue
         late = fits.delayed_columns(np.setdiff1d(columns, own), hypothesis.onset)
         worse = late.held_out(rival, fits.beside(base, *beside)) - reference
-        if worse.sum() > limits.majority_share * gained:
+        if worse.sum() >= gained:
             continue
         apart = distance(worse, undecided, wider, limits)
         if apart <= limits.tie_sigma:

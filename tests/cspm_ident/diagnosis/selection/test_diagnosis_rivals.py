@@ -351,3 +351,35 @@ def test_of_what_explains_the_same_a_wrong_number_is_named_first(model_form_erro
     columns = {scale: LOAD[:, None], radius: beside[:, None]}
     (named,) = named_in(equation(Place(Channel.TENSION, "only"), 0.02 * LOAD, columns, 0.005))
     assert named.hypothesis.effect.id == named_first
+
+
+ONE_WAY, OFFSET = (
+    Hypothesis(catalogue()[name], (Candidate(catalogue()[name], "only"),))
+    for name in ("winch_directional_friction", "winch_torque_offset")
+)
+
+
+@pytest.mark.parametrize(
+    ("fast", "tied"),
+    [
+        # The shaft is fast in one of 16 blocks, which holds half of what friction takes.
+        (np.arange(16) == 14, True),
+        # It is in every other one.
+        (np.arange(16) % 2 == 0, False),
+    ],
+)
+def test_a_rival_is_worse_by_how_many_blocks_say_so_not_by_how_much_one_does(fast, tied):
+    """Where the shaft is slow, a constant is closer in every other pair of blocks."""
+    slow = np.where(np.arange(16) // 2 % 2 == 0, 1.6, 0.4)
+    target = np.repeat(np.where(fast, 6.3, slow), ROWS // 16)
+    columns = {
+        ONE_WAY.candidates[0]: 100.0 * np.repeat(np.where(fast, 6.3, 1.0), ROWS // 16)[:, None],
+        OFFSET.candidates[0]: -100.0 * np.ones((ROWS, 1)),
+    }
+    row = equation(Place(Channel.SHAFT, "only"), target, columns)
+    looked = Search(gather([[row]], 3.0 * BLOCK_S))
+    base = looked.fits.columns([])
+    most, less = (looked.fits.gain(each, base).total for each in (ONE_WAY, OFFSET))
+    assert (less < 0.5 * most) is tied
+    rivals = list(alternatives_of(looked.fits, looked.heard, ONE_WAY, []))
+    assert [rival.hypothesis.effect.id for rival in rivals] == [OFFSET.effect.id] * tied

@@ -126,8 +126,13 @@ def accepted(
     ]
     rejected = (*contradicted, *undecided, *untestable)
     # Otherwise a residual would be reported as unexplained that held-out data excite as little.
+    # What takes less than most of a residual may stand for what is left of it.
     if left_open and not unexplained_beside(search, (*kept, *left_open), rejected, fed_back):
-        left_open = tuple(replace(each, holdout=HoldOut.FAINT) for each in left_open)
+        most = search.thresholds.majority_share
+        left_open = tuple(
+            replace(each, holdout=HoldOut.FAINT) if each.share > most else each
+            for each in left_open
+        )
     return Acceptance((*kept, *left_open, *rejected, *fed_back))
 
 

@@ -139,6 +139,17 @@ def test_what_takes_as_much_as_the_unknown_is_reported_though_no_free_function_d
     assert not module._would_be_unexplained(search, late, ())
 
 
+@pytest.mark.parametrize(("share", "holdout"), [(0.6, HoldOut.FAINT), (0.4, HoldOut.SILENT)])
+def test_what_held_out_data_leave_open_is_named_only_if_it_takes_most_of_a_residual(share, holdout):
+    """The shaft hardly moves in them; what takes less may stand for what is left."""
+    search, still = Search(shaft(2.0)), shaft(0.2, seed=2)
+    square = replace(found_in(search, SQUARE), share=share)
+    found = SearchResult((square,), (), 3)
+    (kept,) = module.accepted(search, found, still, [], [], 0.5).kept
+    assert (kept.hypothesis, kept.holdout) == (SQUARE, holdout)
+    assert (reported_status(kept) is Status.DOUBTFUL) is (holdout is HoldOut.SILENT)
+
+
 def test_what_was_given_up_says_no_more_what_a_finding_is_and_may_be_what_it_is():
     search = Search(shaft(2.0))
     square, late = found_in(search, SQUARE, LINE), found_in(search, LATE)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from cspm.controller import Controller, with_own
 from cspm.progress import Progress, shows_progress, silent
@@ -41,6 +41,9 @@ from cspm_run.recorded_run import (
 from cspm_run.recorded_run import simulate as step_through
 from cspm_run.recorded_scene import RecordedScene
 from cspm_run.run_result import RunResult
+
+if TYPE_CHECKING:
+    from cspm_ros.margins.rehearsal import Variant
 
 GRAPH, PROCESSES, REALTIME = "graph", "processes", "realtime"
 MODES = (INPROCESS, GRAPH, PROCESSES, REALTIME)
@@ -179,6 +182,7 @@ def simulate(
     reference: Reference | None = None,
     plant: str = SIM,
     mode: str = INPROCESS,
+    anyway: bool = False,
     progress: Progress = silent,
 ) -> Run:
     """Simulate a scenario and return its signals.
@@ -197,6 +201,8 @@ def simulate(
             `external`, somebody's drivers.
         mode: `inprocess`, without ROS; `graph`, ROS 2 nodes in one process; `processes`, a process
             per node; these three give the same messages. `realtime`: nodes paced by the clock.
+        anyway: in real time with a simulated plant, begin without a look at how late the machine
+            is.
         progress: called now and then with the share that is done and what is being done;
             none: a bar in a terminal, lines in a notebook.
 
@@ -218,6 +224,7 @@ def simulate(
         0.499
     """
     _check_choices(plant, mode, bool(controllers))
+    check_anyway(plant, mode, anyway=anyway)
     chosen = with_changes(as_scenario(scenario), duration=duration, seed=seed)
     with ScratchFolder("reference") as place:
         if reference is not None:
@@ -232,7 +239,7 @@ def simulate(
     if mode == INPROCESS:
         run = simulate_in_memory(bundle, controllers or {}, show)
     else:
-        run = _by_nodes(bundle, mode, plant == EXTERNAL, show, progress)
+        run = _by_nodes(bundle, mode, plant == EXTERNAL, show, progress, anyway=anyway)
     warn_of(run, stacklevel=3)
     return run
 
@@ -274,6 +281,8 @@ def ros_runner(
     patience_s: float,
     needed_by: str,
     own_nodes: Sequence[str] = (),
+    anyway: bool = False,
+    variant: Variant | None = None,
 ) -> Runner:
     """Return what runs a scenario in a mode that needs ROS; only now is ROS loaded.
 
@@ -285,6 +294,8 @@ def ros_runner(
         patience_s: how long nothing may move [s].
         needed_by: what needs ROS, for the error.
         own_nodes: in processes, controllers that are programs of the user's, by node name.
+        anyway: in real time, begin without a look at how late the machine is.
+        variant: in real time, returns what is run with more values put over the scenario's.
 
     Raises:
         InputError: ROS is not installed.
@@ -296,20 +307,20 @@ def ros_runner(
         from cspm_ros.runtime.graph_run import run_graph
 
         return partial(run_graph, patience_s=patience_s)
-    if mode == REALTIME and not apart:
+    if mode != REALTIME or apart:
+        from cspm_ros.runtime.process_run import run_processes
+
+        runner = partial(run_processes, mode=mode, own_nodes=own_nodes)
+    else:
         from cspm_ros.runtime.realtime_run import run_realtime
 
-        return partial(run_realtime, external=external, notify=notify, patience_s=patience_s)
-    from cspm_ros.runtime.process_run import run_processes
+        runner = partial(run_realtime)
+    runner = partial(runner, external=external, notify=notify, patience_s=patience_s)
+    if mode != REALTIME or anyway:
+        return runner
+    from cspm_ros.margins.rehearsal import rehearsed
 
-    return partial(
-        run_processes,
-        mode=mode,
-        external=external,
-        notify=notify,
-        patience_s=patience_s,
-        own_nodes=own_nodes,
-    )
+    return rehearsed(runner, notify, variant)
 
 
 def warn_of(run: Run, *, stacklevel: int) -> None:
@@ -319,6 +330,18 @@ def warn_of(run: Run, *, stacklevel: int) -> None:
         warnings.warn(f"{name}: {run.failure}", RuntimeWarning, stacklevel=stacklevel)
     for line in run.alarms:
         warnings.warn(f"{name}: {line}", UserWarning, stacklevel=stacklevel)
+
+
+def check_anyway(plant: str, mode: str, option: str = "anyway", *, anyway: bool) -> None:
+    """Refuse to leave the look at the machine out where a bar may fall, or where there is none.
+
+    Raises:
+        InputError: in one line, naming the `option`.
+    """
+    if anyway and mode != REALTIME:
+        raise InputError(f"{option} in mode {mode}: allowed: mode {REALTIME}")
+    if anyway and plant == EXTERNAL:
+        raise InputError(f"{option} with plant {EXTERNAL}: allowed: {', '.join(PLANTS)}")
 
 
 def _check_choices(plant: str, mode: str, own: bool) -> None:
@@ -371,7 +394,13 @@ def _chosen(topics: dict[str, Topic], kept: Collection[str] | None) -> dict[str,
 
 
 def _by_nodes(
-    bundle: Bundle, mode: str, external: bool, show: Callable[[float], None], progress: Progress
+    bundle: Bundle,
+    mode: str,
+    external: bool,
+    show: Callable[[float], None],
+    progress: Progress,
+    *,
+    anyway: bool,
 ) -> Run:
     """Run nodes, which record; the recording lives as long as the run that is returned."""
 
@@ -381,7 +410,13 @@ def _by_nodes(
     from cspm_ros.runtime.stall_watchdog import PATIENCE_S
 
     runner = ros_runner(
-        mode, wait, external=external, apart=False, patience_s=PATIENCE_S, needed_by=f"mode {mode}"
+        mode,
+        wait,
+        external=external,
+        apart=False,
+        patience_s=PATIENCE_S,
+        needed_by=f"mode {mode}",
+        anyway=anyway,
     )
     place = ScratchFolder("run")
     folder = place.path / bundle.scenario.name

@@ -129,6 +129,8 @@ cspm run calm --view --effect winch_coulomb_friction@sway_3:torque=0.02
 
 cspm run calm --mode realtime --plant external
 
+cspm run rest --mode realtime --anyway
+
 Exit code: 0 done, 1 diverged or interrupted, 2 unusable input.""",
 )
 def run(
@@ -174,6 +176,15 @@ def run(
             " its name. Repeat the option for several.",
         ),
     ] = None,
+    anyway: Annotated[
+        bool,
+        typer.Option(
+            "--anyway",
+            help="In real time, with a simulated plant: begin though this computer may be too busy."
+            " Otherwise how late it is is measured for two seconds, and what the loops do not bear"
+            " is refused.",
+        ),
+    ] = False,
     patience: Annotated[
         float | None,
         typer.Option(
@@ -268,17 +279,19 @@ def run(
     refuse_existing(place)
     from cspm.commands.run_beside_command import Settings, run_beside_command
     from cspm.commands.run_command import RunnerOptions, run_command
+    from cspm.simulation import check_anyway
     from cspm_msgs_py.recording.run_record import EXTERNAL
     from cspm_run.plants import PLANTS
 
     if plant not in (*PLANTS, EXTERNAL):
         raise InputError(f"--plant {plant}: allowed: {', '.join((*PLANTS, EXTERNAL))}")
+    check_anyway(plant, mode, "--anyway", anyway=anyway)
     if view:
         from cspm.commands.run_view_command import WatchRequest, check_watchable, run_view_command
 
         check_watchable(len(paths), record=record, beside=laws is not None)
         opened = sys.stdout.isatty() if browser is None else browser
-        options = RunnerOptions(plant, mode, one_process, patience, own_node or ())
+        options = RunnerOptions(plant, mode, one_process, patience, own_node or (), anyway)
         more = (options, testbed, effects or (), port, opened)
         finished = run_view_command(WatchRequest(paths[0], settings, folder, json, *more))
     elif len(paths) == 1 and laws is None:
@@ -294,6 +307,7 @@ def run(
             patience,
             effects or (),
             own_node or (),
+            anyway,
         )
     else:
         _check_beside(mode, plant, own_node or (), under_laws=laws is not None)

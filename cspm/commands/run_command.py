@@ -6,6 +6,7 @@ import dataclasses
 import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
@@ -34,6 +35,9 @@ from cspm_run.run_result import RunResult
 from cspm_run.stability.run_warnings import unstable_line
 from cspm_run.stage_warm_up import compile_beside
 
+if TYPE_CHECKING:
+    from cspm_ros.margins.rehearsal import Variant
+
 
 def run_command(
     path: Path,
@@ -47,6 +51,7 @@ def run_command(
     patience: float | None = None,
     effects: Sequence[str] = (),
     own_nodes: Sequence[str] = (),
+    anyway: bool = False,
 ) -> bool:
     """Run a scenario file, show the result, and return whether it ran to its end.
 
@@ -62,6 +67,7 @@ def run_command(
         patience: with ROS, longest stall [s]; None for the default.
         effects: physics planted in the machine, `EFFECT@ELEMENT,…:PARAMETER=VALUE,…`.
         own_nodes: controllers that are ROS programs of the user's, by node name.
+        anyway: in real time, begin without a look at how late the machine is.
 
     Raises:
         CspmError: the run diverged, or a node failed; recording and figure are kept.
@@ -70,10 +76,12 @@ def run_command(
     check_patience_option(patience, mode)
     bundle = bundle_from(path, overrides, machine, plant, effects)
     compile_beside(bundle)
-    options = RunnerOptions(plant, mode, one_process, patience, own_nodes)
+    options = RunnerOptions(plant, mode, one_process, patience, own_nodes, anyway)
     options.check(bundle)
     refuse_existing(folder)
-    runner = options.runner(console)
+    runner = options.runner(
+        console, lambda more: bundle_from(path, [*overrides, *more], machine, plant, effects)
+    )
     testbed = bundle.testbed.testbed
     unstable = unstable_line(bundle.scenario, testbed, late=mode == REALTIME)
     for line in (*limit_warnings(testbed), *([unstable] if unstable else [])):
@@ -107,6 +115,7 @@ class RunnerOptions:
         one_process: in real time, whether all nodes share a process; None for yes.
         patience: with ROS, longest stall [s]; None for the default.
         own_nodes: controllers that are ROS programs of the user's, by node name.
+        anyway: in real time, begin without a look at how late the machine is.
     """
 
     plant: str
@@ -114,6 +123,7 @@ class RunnerOptions:
     one_process: bool | None = None
     patience: float | None = None
     own_nodes: Sequence[str] = ()
+    anyway: bool = False
 
     def check(self, bundle: Bundle) -> None:
         """Refuse options that do not go together, or with what is run.
@@ -128,8 +138,10 @@ class RunnerOptions:
             raise InputError(f"{option} --mode {self.mode}: allowed: --mode {REALTIME}")
         _check_own_nodes(self.own_nodes, self.mode, bundle)
 
-    def runner(self, console: Console) -> Runner | None:
+    def runner(self, console: Console, variant: Variant | None = None) -> Runner | None:
         """Return what runs a scenario as ROS nodes; None in this process, without ROS.
+
+        `variant` returns what is run with more values put over the scenario's, `KEY=VALUE`.
 
         Raises:
             InputError: ROS is not installed.
@@ -148,6 +160,8 @@ class RunnerOptions:
             patience_s=PATIENCE_S if self.patience is None else self.patience,
             needed_by=f"--mode {self.mode}",
             own_nodes=self.own_nodes,
+            anyway=self.anyway,
+            variant=variant,
         )
 
 

@@ -67,19 +67,23 @@ class NodeHost:
         nodes: their processes, by name.
     """
 
-    def __init__(self, names: Sequence[str], parameters: Path, log: Path) -> None:
+    def __init__(
+        self, names: Sequence[str], parameters: Path, log: Path, namespace: str = "/"
+    ) -> None:
         """Start it.
 
         Args:
             names: of the nodes.
             parameters: ROS 2 parameter file for all of them.
             log: folder for what they print.
+            namespace: of all of them.
         """
         self.nodes = {name: HostedProcess(self) for name in names}
         for name in names:
             (log / f"{name}.log").touch()
         self._rest = b""
-        command = [sys.executable, "-m", "cspm_ros.processes.node_host", str(parameters), str(log)]
+        command = [sys.executable, "-m", "cspm_ros.processes.node_host"]
+        command += [str(parameters), str(log), namespace]
         with (log / HOST_LOG).open("wb") as errors:
             self._process = subprocess.Popen(
                 [*command, *names],

@@ -17,7 +17,7 @@ from cspm_ros.runtime.node_main import ROS_ARGS, main
 STARTED, ENDED = "started", "ended"
 
 
-def host(names: Sequence[str], parameters: str, log: Path) -> int:
+def host(names: Sequence[str], parameters: str, log: Path, namespace: str) -> int:
     """Fork a process per node, and say on standard output how each of them ends.
 
     Nothing of ROS 2 may have started before: threads do not survive a fork.
@@ -26,6 +26,7 @@ def host(names: Sequence[str], parameters: str, log: Path) -> int:
         names: of the nodes.
         parameters: file of ROS 2 parameters for all of them.
         log: folder for what they print.
+        namespace: of all of them.
     """
     began = time.perf_counter()
     preload()
@@ -33,7 +34,7 @@ def host(names: Sequence[str], parameters: str, log: Path) -> int:
     for name in names:
         process = os.fork()
         if process == 0:
-            args = [ROS_ARGS, "--params-file", parameters]
+            args = [ROS_ARGS, "--params-file", parameters, "-r", f"__ns:={namespace}"]
             _become(name, args, log)
             return main(name, args, began)
         running[process] = name
@@ -59,4 +60,4 @@ def _say(what: str, name: str, number: int) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(host(sys.argv[3:], sys.argv[1], Path(sys.argv[2])))
+    sys.exit(host(sys.argv[4:], sys.argv[1], Path(sys.argv[2]), sys.argv[3]))

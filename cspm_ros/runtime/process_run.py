@@ -54,6 +54,7 @@ def run_processes(
     notify: Callable[[str], None] = lambda _: None,
     steps: int | None = None,
     domain_id: int | None = None,
+    namespace: str = "/",
     patience_s: float = PATIENCE_S,
     own_nodes: Sequence[str] = (),
 ) -> RunResult:
@@ -69,6 +70,7 @@ def run_processes(
             the nodes warn of.
         steps: end after so many plant steps; None runs the scenario's duration.
         domain_id: instead of `ROS_DOMAIN_ID`.
+        namespace: of all nodes, where this run meets no other.
         patience_s: give up when nothing moves for so long [s]; in real time it bounds the start
             alone, and not where somebody's drivers are waited for.
         own_nodes: controllers that are programs of the user's, by node name, in lockstep.
@@ -91,7 +93,9 @@ def run_processes(
         check_real_time(scenario.safety, schedule)
     # In lockstep the recorder has 48 steps of time; by the wall clock it would lose messages.
     behind = () if mode == REALTIME else (RECORDER,)
-    refuse_claimed(domain_id or int(os.environ.get("ROS_DOMAIN_ID") or 0), START)
+    refuse_claimed(
+        domain_id or int(os.environ.get("ROS_DOMAIN_ID") or 0), namespace.rstrip("/") + START
+    )
     with ScratchFolder("run") as place:
         parameters = NodeParameters(
             plant=bundle.plant,
@@ -113,7 +117,7 @@ def run_processes(
             _environment(domain_id),
             interruptible() as stop_wanted,
             NodeProcesses(
-                NodeHost(started, place / "parameters.yaml", place), place, behind
+                NodeHost(started, place / "parameters.yaml", place, namespace), place, behind
             ) as processes,
         ):
             leader = RECORDER if external else PLANT

@@ -43,8 +43,8 @@ from cspm_msgs_py.topics import (
 )
 from cspm_ros.check_drivers.proof_port import ProofPort
 from cspm_ros.inject.fault_port import FaultPort
+from cspm_ros.margins.lateness import lateness_ns
 from cspm_ros.runtime.goal_port import GoalPort, make_goals
-from cspm_ros.runtime.lateness import lateness_ns
 from cspm_ros.runtime.node_parameters import GOAL_S
 from cspm_ros.runtime.nodes_of_run import NodesOfRun
 from cspm_ros.runtime.realtime_recorder_node import RealtimeRecorderNode

@@ -17,6 +17,7 @@ from cspm_msgs_py.errors import CspmError
 from cspm_msgs_py.graph import RECORDER, members_of
 from cspm_msgs_py.ros.session import FAREWELL_S, Session
 from cspm_msgs_py.schedule import schedule_of
+from cspm_ros.runtime.node_main import ROS_ARGS
 from cspm_ros.runtime.realtime_nodes import RealtimeRun
 from cspm_ros.runtime.stall_watchdog import LOOK_EVERY_S, PATIENCE_S, Patience, StartWatch
 from cspm_run.bundle import Bundle
@@ -35,6 +36,7 @@ def run_realtime(
     notify: Callable[[str], None] = lambda _: None,
     steps: int | None = None,
     domain_id: int | None = None,
+    namespace: str = "/",
     patience_s: float = PATIENCE_S,
 ) -> RunResult:
     """Run a scenario by the wall clock, as ROS 2 nodes in this process.
@@ -47,6 +49,7 @@ def run_realtime(
         notify: called with what the start waits for, in one line, when that changes.
         steps: end after so many plant steps; None runs the scenario's duration.
         domain_id: instead of `ROS_DOMAIN_ID`.
+        namespace: of all nodes, where this run meets no other.
         patience_s: bounds the start [s], as in lockstep, but not where somebody's drivers are
             waited for.
 
@@ -61,7 +64,8 @@ def run_realtime(
     run = RealtimeRun(bundle, members_of(schedule_of(scenario, testbed), external=external))
     steps = steps or round(scenario.duration * scenario.rates.plant)
     with ExitStack() as stack:
-        session = stack.enter_context(Session(domain_id=domain_id, polled=True))
+        args = [ROS_ARGS, "-r", f"__ns:={namespace}"]
+        session = stack.enter_context(Session(args, domain_id=domain_id, polled=True))
         leads = session.node(run.leader)
         # Before any other node is there, which another run's could hear.
         run.claim(leads)

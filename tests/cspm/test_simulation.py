@@ -147,6 +147,11 @@ class Wrong:
     [
         ({"plant": "matlab"}, "plant matlab: allowed: sim, mujoco, external"),
         ({"plant": "external"}, "plant external in mode inprocess: allowed: mode realtime"),
+        ({"anyway": True}, "anyway in mode inprocess: allowed: mode realtime"),
+        (
+            {"anyway": True, "plant": "external", "mode": "realtime"},
+            "anyway with plant external: allowed: sim, mujoco",
+        ),
         ({"mode": "cloud"}, "mode cloud: allowed: inprocess, graph, processes, realtime"),
         (
             {"mode": "graph", "controllers": {"force_controller": Copy()}},

@@ -16,7 +16,7 @@ from cspm_control.safety import GuardedStage
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.schedule import CLOCK, FORCE_CONTROLLER, TENSION, TORQUE_COMMAND, WAVE_TRAJECTORY
 from cspm_msgs_py.stepping.sample_and_hold import SampleAndHold, WallTrajectory
-from cspm_ros.runtime.lateness import lateness_ns
+from cspm_ros.margins.lateness import lateness_ns
 from cspm_run.assembly import assemble
 from cspm_run.plant_guard import make_watchdog
 from cspm_sim.realtime_plant import RealtimePlant

@@ -128,6 +128,11 @@ REST = f"{SCENARIOS}/rest.yaml"
             ["--mode", "processes", "--own-node", "rudder"],
             "--own-node rudder: allowed: wave_trajectory, motion_controller, ",
         ),
+        (["--anyway"], "--anyway in mode inprocess: allowed: mode realtime"),
+        (
+            ["--mode", "realtime", "--plant", "external", "--anyway"],
+            "--anyway with plant external: allowed: sim, mujoco",
+        ),
         (
             ["--patience", "5"],
             "--patience --mode inprocess: allowed: --mode graph, processes or re",

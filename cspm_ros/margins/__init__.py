@@ -1,0 +1,1 @@
+"""How late commands may come, and how late they do on this machine."""

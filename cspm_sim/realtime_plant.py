@@ -144,6 +144,10 @@ class RealtimePlant:
         """Set or release the brakes."""
         self._watchdog.brake(wanted)
 
+    def receive_safe(self, safe: bool) -> None:
+        """Hold by itself while the force controller is in its safe state."""
+        self._watchdog.hold(safe)
+
     def tick(self, now_ns: int) -> None:
         """Make the steps that are due; to be called at least once in every period."""
         if self._start_ns is None or now_ns < self._start_ns or self.ended:
@@ -165,10 +169,10 @@ class RealtimePlant:
         safe = self._watchdog.torque(self.now_ns(now_ns))
         if safe is not None:
             simulator.torque = safe
-            if not self._safe:
+            if self._watchdog.safe and not self._safe:
                 # Or controllers would go on as if they were obeyed.
                 self._on_fault(self._watchdog.reason)
-        self._safe = safe is not None
+        self._safe = self._watchdog.safe
         try:
             simulator.advance()
         except DivergenceError as err:

@@ -17,7 +17,7 @@ from cspm_msgs_py.ros.graph_publishers import bind, census_of
 from cspm_msgs_py.ros.leader import Leader
 from cspm_msgs_py.schedule import CLOCK, FORCE_CONTROLLER, PLANT, TORQUE_COMMAND, Schedule
 from cspm_msgs_py.stepping.drive_link import DriveLink
-from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, Topic
+from cspm_msgs_py.topics import BRAKE, DIAGNOSTICS, SAFE, Topic
 from cspm_sim.plant_run import PlantRun
 from cspm_sim.realtime_plant import RealtimePlant
 from cspm_sim.simulator import Publish
@@ -99,13 +99,17 @@ class RealtimePlantNode:
         link.now_ns = lambda: self._plant.now_ns(self._node.now_ns())
 
     def _subscribe(self, topics: Mapping[str, Topic], schedule: Schedule) -> None:
-        """Hear torques and brakes from the force controller."""
+        """Hear torques, brakes and the safe state from the force controller."""
         node = self._node
         if TORQUE_COMMAND in schedule.topics:
             refuse = partial(self._refuse, TORQUE_COMMAND)
             node.subscribe_tagged_rows(topics[TORQUE_COMMAND], self._torque, refuse)
         if FORCE_CONTROLLER in schedule.nodes:
-            BoundFlag(node, BRAKE, FORCE_CONTROLLER, self._plant.receive_brake, self._refuse)
+            for flag, take in (
+                (BRAKE, self._plant.receive_brake),
+                (SAFE, self._plant.receive_safe),
+            ):
+                BoundFlag(node, flag, FORCE_CONTROLLER, take, self._refuse)
 
     @property
     def ended(self) -> bool:

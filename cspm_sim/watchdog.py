@@ -48,7 +48,7 @@ class Watchdog:
         self._latch = Latch()
         self._commanded_ns: int | None = None
         self._answered_ns: int | None = None
-        self._entered = False
+        self._entered = self._held = False
         self._brake_wanted = plant.locked
 
     @property
@@ -70,6 +70,15 @@ class Watchdog:
         """Go to the safe state for a reason that came and went."""
         self._latch.trip(now_ns, reason)
 
+    def hold(self, wanted: bool) -> None:
+        """Be in the safe state while the force controller is in its own; it reports why.
+
+        What it commands meanwhile comes late where the machine is busy, and is not needed.
+        """
+        self._held = wanted
+        if not wanted and not self._latch.open:
+            self._leave()
+
     def brake(self, wanted: bool) -> None:
         """Set the plant's brakes, or release them as far as the safe state does not need them."""
         self._brake_wanted = wanted
@@ -85,7 +94,7 @@ class Watchdog:
         if self._answered_ns is not None and self._oldest_ns is not None:
             what, age = f"{TORQUE_COMMAND} in force answers a state of", now_ns - self._answered_ns
             self._latch.stand(now_ns, _LATENESS, too_busy(what, age, self._oldest_ns))
-        if not self._latch.open:
+        if not (self._latch.open or self._held):
             return None
         if not self._entered:
             self._entered = True
@@ -97,9 +106,8 @@ class Watchdog:
     def reset(self) -> str | None:
         """Follow commands again; return why not in one line while a reason lasts."""
         refusal = self._latch.release()
-        if refusal is None:
-            self._entered = False
-            self._set_brakes()
+        if refusal is None and not self._held:
+            self._leave()
         return refusal
 
     def status(self) -> Status:
@@ -107,6 +115,10 @@ class Watchdog:
         waits = self._commanded_ns is None
         message = "waits for the first torque command" if waits else "ok"
         return self._latch.status(self._safe_state.name, Status(Level.OK, self.name, message, {}))
+
+    def _leave(self) -> None:
+        self._entered = False
+        self._set_brakes()
 
     def _set_brakes(self) -> None:
         self._plant.locked = self._brake_wanted or (self._entered and self._safe_state.brake)

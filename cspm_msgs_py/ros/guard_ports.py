@@ -55,6 +55,8 @@ class GuardPorts:
 
     def _reset(self, _: object, response: object) -> object:
         refusal = self._release(self._now_ns())
+        # The drives hold by themselves until they hear of it.
+        self._report()
         response.success = refusal is None  # type: ignore[attr-defined]
         response.message = refusal or "running"  # type: ignore[attr-defined]
         return response

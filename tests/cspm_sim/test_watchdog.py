@@ -258,3 +258,27 @@ def test_both_plants_brake_equally():
     np.testing.assert_allclose(ours.bar_state, theirs.bar_state, atol=1e-5)
     np.testing.assert_allclose(ours.angles, theirs.angles, atol=1e-4)
     assert np.abs(ours.bar_state[:3] - POSE[:3]).max() > 0.01
+
+
+@pytest.mark.parametrize("state", ["hold", "brake"])
+def test_it_joins_the_force_controller_in_its_safe_state_and_leaves_it_with_it(state):
+    """By no reason of its own; and not before its own reason is over."""
+    drives = Drives(f"{{state: {state}}}")
+    command = carried(drives.plant)
+    assert not any(drives.go(20, command))
+    drives.dog.hold(True)
+    # What is commanded meanwhile would drop the bar.
+    assert all(drives.go(500, np.zeros(N)))
+    assert abs(drives.sunk) < 0.01
+    assert drives.plant.locked == (state == "brake")
+    assert not drives.dog.safe
+    assert drives.dog.status().level == Level.OK
+    drives.dog.hold(False)
+    assert not any(drives.go(20, command))
+    assert not drives.plant.locked
+    drives.dog.trip(drives.now_ns, "broken")
+    drives.dog.hold(True)
+    drives.dog.hold(False)
+    assert all(drives.go(20, command))
+    assert drives.dog.reset() is None
+    assert not any(drives.go(20, command))

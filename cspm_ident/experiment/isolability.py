@@ -74,7 +74,7 @@ def signatures(
     Args:
         measurement: exact readings of all sensors along a rich motion, with cells at the bar.
         effects: each is looked at in the middle of its grid.
-        cable: on which those act that act on cables; others act on the bar or the frame.
+        cable: on which those act that act on cables or load cells; others on the bar or the frame.
         sensors: those that there are.
     """
     seen = sensors.of(measurement)
@@ -82,7 +82,8 @@ def signatures(
     equations = equations_of(seen, looked)
     found = []
     for effect in looked:
-        element = cable if effect.acts_on is Elements.CABLES else _body(effect)
+        own = effect.acts_on in (Elements.CABLES, Elements.CELLS)
+        element = cable if own else _body(effect)
         candidate = Candidate(effect, element, next(shapes_of(effect)))
         columns = {e.place: e.columns[candidate] for e in equations if candidate in e.columns}
         if sensors.at_drum and effect.block is Block.CABLE:

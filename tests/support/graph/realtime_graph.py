@@ -152,7 +152,7 @@ class Graph:
 
 
 # What a busy computer does to a run that is in order.
-LATE = (" stale: ", "no /winches/torque_command for ")
+LATE = (" stale: ", "no /winches/torque_command for ", "machine too busy: ")
 
 
 class Witness:

@@ -94,8 +94,7 @@ class Watchdog:
         if self._answered_ns is not None and self._oldest_ns is not None:
             age, since = now_ns - self._answered_ns, now_ns - (self._commanded_ns or now_ns)
             # A sender that is gone looks like one that is late, but for this.
-            newest = f"the newest, of {since * 1e-6:.1f} ms ago, answers a state of"
-            what = f"{TORQUE_COMMAND}: {newest}"
+            what = f"{TORQUE_COMMAND} of {since * 1e-6:.1f} ms ago, the newest, answers a state of"
             self._latch.stand(now_ns, _LATENESS, too_busy(what, age, self._oldest_ns))
         if not (self._latch.open or self._held):
             return None

@@ -105,6 +105,9 @@ def check_machine(
     scenario, testbed = bundle.scenario, bundle.testbed.testbed
     check_real_time(scenario.safety, schedule_of(scenario, testbed))
     refuse_claimed(int(os.environ.get("ROS_DOMAIN_ID") or 0), _START)
+    if os.environ.get("ROS_SECURITY_ENABLE", "").lower() == "true":
+        notify("not rehearsed: a secured graph has no other namespace (ROS_SECURITY_ENABLE)")
+        return
     found = measure(bundle, runner, notify)
     if found is None or found.bearable:
         return

@@ -43,6 +43,20 @@ def test_where_nothing_says_how_late_commands_may_be_nothing_is_measured():
     assert measure(bundle_of("one_winch"), never, never) is None
 
 
+def test_a_secured_graph_is_not_rehearsed_and_that_is_said(monkeypatch):
+    def never(*_, **__):
+        raise AssertionError
+
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(new_domain()))
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
+    said = []
+    check_machine(slow_bundle(), never, said.append)
+    assert said == ["not rehearsed: a secured graph has no other namespace (ROS_SECURITY_ENABLE)"]
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", "false")
+    with pytest.raises(AssertionError):
+        check_machine(slow_bundle(), never, said.append)
+
+
 @pytest.mark.slow
 @pytest.mark.realtime
 def test_what_the_machine_does_not_bear_is_refused_and_what_it_bears_is_named(monkeypatch):

@@ -121,7 +121,7 @@ def test_a_dead_node_is_named_and_what_the_others_did_is_recorded(tmp_path):
     evidence = Evidence(command.folder)
     ((_, reason),) = evidence.alarms("plant/watchdog")
     # The state that the last command answers is as old as the command, and a little older.
-    silent = f"no {TORQUE_COMMAND} for ", f"machine too busy: {TORQUE_COMMAND}: the newest, of "
+    silent = f"no {TORQUE_COMMAND} for ", f"machine too busy: {TORQUE_COMMAND} of "
     assert reason.startswith(silent)
     assert "recording" in out
 

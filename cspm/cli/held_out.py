@@ -54,7 +54,7 @@ def refuse_searched_after_held_out(parameters: Iterable[Any], words: Sequence[st
         InputError: naming what comes after it and the forms that are allowed.
     """
     held, after = "", list[str]()
-    for option, word in _told_apart(parameters, words):
+    for option, word in _separated(parameters, words):
         if option == OPTION:
             held = word
         elif not option and held:
@@ -67,7 +67,7 @@ def refuse_searched_after_held_out(parameters: Iterable[Any], words: Sequence[st
         )
 
 
-def _told_apart(parameters: Iterable[Any], words: Sequence[str]) -> Iterator[tuple[str, str]]:
+def _separated(parameters: Iterable[Any], words: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield options with their values, and arguments as values of no option, in their order."""
     valued = {name for each in parameters if not _is_bare(each) for name in each.opts}
     rest = iter(words)

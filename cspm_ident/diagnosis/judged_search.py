@@ -18,7 +18,7 @@ from cspm_ident.diagnosis.residuals.free_shapes import Driver
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
-from cspm_ident.diagnosis.selection.delay_or_low_pass import with_told_apart
+from cspm_ident.diagnosis.selection.delay_or_low_pass import with_lateness_separated
 from cspm_ident.diagnosis.selection.refinement import needs_refining
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.selection.search_pass import (
@@ -142,7 +142,7 @@ def searched_and_judged(
 ) -> JudgedSearch:
     """Search recordings, and hold what is found against held-out data."""
     last, found = searched_for(recordings, effects, progress, thresholds)
-    last, found = with_told_apart(found, last, recordings, thresholds)
+    last, found = with_lateness_separated(found, last, recordings, thresholds)
     found = with_wider(found, in_noise(last.search_parts, last.noise), last.block, thresholds)
     progress("held-out data")
     judge = _judge(in_noise(last.judge_parts, last.noise), found, last.block)

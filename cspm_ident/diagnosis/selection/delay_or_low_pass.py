@@ -1,4 +1,4 @@
-"""Delay or low pass: readings corrected exactly tell what columns of first order cannot.
+"""Delay or low pass: what readings corrected exactly separate, where columns do not.
 
 To first order both leave the reading's rate times a time. A delay keeps the amplitude, and a low
 pass does not.
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 Left = Callable[[Sequence[Hypothesis]], Array]
 
 
-def with_told_apart(
+def with_lateness_separated(
     found: SearchResult, last: SearchPass, recordings: Recordings, thresholds: Thresholds
 ) -> tuple[SearchPass, SearchResult]:
     """Return the findings, each delay or low pass as the one of both that leaves less.
@@ -58,13 +58,13 @@ def with_told_apart(
     def left(hypotheses: Sequence[Hypothesis]) -> Array:
         return _left(hypotheses, last, searched, cut, thresholds)
 
-    findings = [_told_apart(each, chosen, left, thresholds) for each in found.findings]
+    findings = [_separated(each, chosen, left, thresholds) for each in found.findings]
     gone = [c for _, own in findings for c in own]
     last = last._replace(search=last.search.without(gone)) if gone else last
     return last, found._replace(findings=tuple(finding for finding, _ in findings))
 
 
-def _told_apart(
+def _separated(
     finding: Finding, chosen: Sequence[Hypothesis], left: Left, thresholds: Thresholds
 ) -> tuple[Finding, tuple[Candidate, ...]]:
     """Return the finding as it is now, and the candidates that are none any more."""
@@ -76,7 +76,7 @@ def _told_apart(
     try:
         worse = left([*others, twin.hypothesis]) - left([*others, own])
     except InputError:
-        # One of both corrects a machine to an impossible one: nothing is told.
+        # One of both corrects a machine to an impossible one: nothing separates them.
         return finding, ()
     rest = tuple(r for r in finding.alternatives if r is not twin)
     if behind(paired(worse)) > thresholds.tie_sigma:

@@ -19,6 +19,7 @@ from cspm_run.library import scenario_names, testbed_names
 _MIDDLEWARE = "rmw_fastrtps_cpp"
 _SERVES = {
     "files": "importing spreadsheets, Parquet, HDF5 and MATLAB 7.3",
+    "benches": "importing TDMS and MDF",
     "tables": "to_pandas, to_xarray",
     "campaign": "cspm campaign",
     "mujoco": "--plant mujoco",

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from cspm_ident.importing.mapping import CsvFormat, MappingFile
 from cspm_ident.importing.sources.bag_source import BagSource
+from cspm_ident.importing.sources.bench_source import MdfSource, TdmsSource
 from cspm_ident.importing.sources.csv_source import CsvSource
 from cspm_ident.importing.sources.hdf5_source import Hdf5Source
 from cspm_ident.importing.sources.joined_source import JoinedSource
@@ -28,19 +29,13 @@ _MATLAB_HDF5 = b"MATLAB 7.3 MAT-file"
 _GZIP = b"\x1f\x8b"
 _ZIP = b"PK\x03\x04"
 _PARQUET = b"PAR1"
-_BENCHES = {
-    b"TDSm": "a TDMS file of LabVIEW, allowed: exported by `python -m pip install nptdms` and"
-    " `TdmsFile.read(FILE).as_dataframe(time_index=True).to_parquet(OUT)`",
-    **dict.fromkeys(
-        (b"MDF     3", b"MDF     4", b"UnFinMF "),
-        "an MDF file, allowed: exported by `python -m pip install asammdf` and"
-        " `MDF(FILE).export('parquet', OUT)`",
-    ),
-}
+_TDMS = b"TDSm"
+_MDF = (b"MDF     3", b"MDF     4", b"UnFinMF ")
 _OLD_OFFICE = b"\xd0\xcf\x11\xe0"
 _TORCH = (".pt", ".pth")
 ALLOWED = (
-    "allowed: a text table, .csv.gz, .json, .npz, .xlsx, .parquet, .mat or HDF5 file, or a bag"
+    "allowed: a text table, .csv.gz, .json, .npz, .xlsx, .parquet, .mat, HDF5, TDMS or MDF"
+    " file, or a bag"
 )
 
 
@@ -95,9 +90,10 @@ def _opened(path: Path, form: CsvFormat, where: str) -> Source:
 def _binary_table(path: Path, start: bytes, form: CsvFormat) -> Source | None:
     if start.startswith(_HDF5) or start.startswith(_MATLAB_HDF5):
         return Hdf5Source(path, matlab=not start.startswith(_HDF5) or path.suffix == ".mat")
-    for mark, what in _BENCHES.items():
-        if start.startswith(mark):
-            raise InputError(f"{path}: {what}")
+    if start.startswith(_TDMS):
+        return TdmsSource(path)
+    if start.startswith(_MDF):
+        return MdfSource(path)
     if start.startswith(_PARQUET):
         return ParquetSource(path)
     if path.suffix in _TORCH:

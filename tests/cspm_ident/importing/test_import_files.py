@@ -207,14 +207,60 @@ def test_durations_are_times(tmp_path):
     assert set(np.diff(found.stamps[STATE])) == {10_000_000}
 
 
+ANGLES = np.sin(np.arange(40) / 20.0)
+
+
+def tdms(path, **groups):
+    """Write groups of channels; a channel is values, or values and properties."""
+    nptdms = pytest.importorskip("nptdms")
+    objects = [
+        nptdms.ChannelObject(group, name, *(own if isinstance(own, tuple) else (own,)))
+        for group, channels in groups.items()
+        for name, own in channels.items()
+    ]
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment(objects)
+
+
+def test_channels_of_tdms_are_columns_and_waveforms_have_a_time(tmp_path):
+    times = 0.01 * np.arange(40)
+    path = tmp_path / "lab.tdms"
+    tdms(path, drive={"t": times, "q": ANGLES}, cell={"q": np.ones(40)})
+    found = imported(path, MAPPING % ("", "t", "drive.q"), trial=True)
+    assert found.rows[STATE][:, 0] == pytest.approx(ANGLES)
+    tdms(path, drive={"q": (ANGLES, {"wf_increment": 0.01})})
+    found = imported(path, MAPPING % ("", "time", "q"), trial=True)
+    assert set(np.diff(found.stamps[STATE])) == {10_000_000}
+    assert found.rows[STATE][:, 0] == pytest.approx(ANGLES)
+
+
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_channels_of_mdf_are_columns_beside_their_group_s_time(tmp_path, version):
+    asammdf = pytest.importorskip("asammdf")
+    times, suffix = 0.01 * np.arange(40), {"3.30": "mdf", "4.10": "mf4"}[version]
+    with asammdf.MDF(version=version) as file:
+        file.append([asammdf.Signal(ANGLES, times, name="q")])
+        path = file.save(tmp_path / f"lab.{suffix}")
+    found = imported(path, MAPPING % ("", "time", "q"), trial=True)
+    assert set(np.diff(found.stamps[STATE])) == {10_000_000}
+    assert found.rows[STATE][:, 0] == pytest.approx(ANGLES)
+
+
 @pytest.mark.parametrize(
-    ("start", "named"),
-    [(b"TDSm\x0e", "nptdms"), (b"MDF     4.10    ", "asammdf"), (b"MDF     3.30    ", "asammdf")],
+    ("start", "kind", "library"),
+    [
+        (b"TDSm\x0e", "TDMS", "nptdms"),
+        (b"MDF     4.10    ", "MDF", "asammdf"),
+        (b"MDF     3.30    ", "MDF", "asammdf"),
+    ],
 )
-def test_files_of_test_benches_are_named_with_what_exports_them(tmp_path, start, named):
+def test_damaged_files_of_test_benches_are_one_line(tmp_path, monkeypatch, start, kind, library):
     path = tmp_path / "lab.bin"
     path.write_bytes(start + bytes(100))
-    with pytest.raises(InputError, match=named):
+    with pytest.raises(InputError, match=rf"lab.bin: (no {kind} file that can be read|holds no)"):
+        imported(path, MAPPING % ("", "t", "q"))
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(InputError, match=r"after `pip install 'cspm\[benches\]'`, or exported"):
         imported(path, MAPPING % ("", "t", "q"))
 
 

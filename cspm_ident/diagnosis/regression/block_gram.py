@@ -271,6 +271,8 @@ def _of_place(
         table = _table(equation, own, slices, where)
         blocks = np.flatnonzero(recording == r)
         home = blocks[np.searchsorted(edges[blocks], equation.times, side="right") - 1]
+        if not len(home):
+            continue
         # Rows are in order of time, so that a block's are next to each other.
         found, first = np.unique(home, return_index=True)
         for block, own_rows in zip(found, np.split(table, first[1:]), strict=True):

@@ -103,7 +103,9 @@ class Process:
         words = [word for pair in parameters.items() for word in ("-p", "{}:={}".format(*pair))]
         self.process = subprocess.Popen(
             [sys.executable, DRIVER, "--ros-args", *words],
-            env=os.environ | {"ROS_DOMAIN_ID": str(self.domain)},
+            # rclpy warns of its own handlers where a signal comes between two of its steps.
+            env=os.environ
+            | {"ROS_DOMAIN_ID": str(self.domain), "PYTHONWARNINGS": "ignore::RuntimeWarning"},
             stderr=subprocess.PIPE,
             text=True,
         )

@@ -32,6 +32,7 @@ from bench.page import into_page
 from cspm.campaign.cluster import worker_pool
 from cspm_ident.diagnosis.regression.block_regression import Gain, gain_of
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis, freedom, shapes_of
+from cspm_ident.diagnosis.residuals.machine_scales import of_size
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 from cspm_ident.diagnosis.selection.search import Search
 from cspm_ident.diagnosis.selection.search_pass import Recordings, searched_for
@@ -106,7 +107,8 @@ def main() -> None:
 def miss_of(outcome: Outcome, item: Data, recording: Path) -> Miss:
     """Search a recording again and hold what is concealed against what was found."""
     given = Recordings([read_measurement(recording)], [])
-    look, found = searched_for(given, list(catalogue().values()), lambda _: None)
+    effects = of_size(catalogue().values(), given.searched)
+    look, found = searched_for(given, effects, lambda _: None)
     return compared(outcome, item, look.search, [each.hypothesis for each in found.findings])
 
 

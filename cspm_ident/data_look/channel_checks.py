@@ -12,12 +12,7 @@ from cspm_ident.signals.jumps import jumps
 from cspm_ident.signals.measurement import Measurement
 from cspm_ident.signals.samples import Samples
 from cspm_run.run_statistics import torque_limits
-from cspm_run.stability.saturation import (
-    STRETCH_S,
-    DriveSaturation,
-    saturation_of,
-    saturation_words,
-)
+from cspm_run.stability.saturation import DriveSaturation, saturation_of, saturation_words
 
 # A reading that is held so long while its winch moves, to the last digit, is no reading.
 _HELD_S, _HELD_SAMPLES = 0.2, 20
@@ -67,18 +62,23 @@ def slack_check(measurement: Measurement) -> DataCheck:
     return check_of("slack", measurement.path, found, "no cable is slack", remedy)
 
 
+def drives_at_limit(measurement: Measurement) -> list[DriveSaturation]:
+    """Return how each drive met its torque limit; empty without torques."""
+    torque, machine = measurement.torque, measurement.machine
+    if torque is None:
+        return []
+    limits = LIMIT * torque_limits(machine)
+    return saturation_of(torque.times, torque.values, limits, machine.cable_names)
+
+
 def saturation_check(measurement: Measurement) -> DataCheck:
     """Return which drives are at their torque limit, and how much of the time.
 
     A drive that chatters at it follows on average, which is said and is well.
     """
-    torque, machine = measurement.torque, measurement.machine
-    drives: list[DriveSaturation] = []
-    if torque is not None:
-        limits = LIMIT * torque_limits(machine)
-        drives = saturation_of(torque.times, torque.values, limits, machine.cable_names)
-    lasting = saturation_words((each for each in drives if each.longest >= STRETCH_S), _SHARE)
-    touching = saturation_words((each for each in drives if each.longest < STRETCH_S), _SHARE)
+    drives = drives_at_limit(measurement)
+    lasting = saturation_words((each for each in drives if each.lasts), _SHARE)
+    touching = saturation_words((each for each in drives if not each.lasts), _SHARE)
     found = [f"at their torque limit: {lasting}"] if lasting else []
     well = (
         f"drives touch their torque limit: {touching}" if touching else "no drive is at its limit"

@@ -32,6 +32,7 @@ from cspm_ident.diagnosis.residuals.data_split import first_part, whole_part
 from cspm_ident.diagnosis.residuals.file_effects import with_file_accuracies, with_file_bounds
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
 from cspm_ident.diagnosis.residuals.load_cell_clock import on_drives_clock
+from cspm_ident.diagnosis.residuals.machine_scales import of_size
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, steady
 from cspm_ident.diagnosis.residuals.spectral_lines import Line
@@ -87,8 +88,10 @@ def diagnose(
         *([on_drives_clock(each, thresholds) for each in own] for own in (searched, held_out))
     )
     effects = list(catalogue().values()) if effects is None else effects
-    effects = with_file_accuracies(effects, recordings.searched[0].testbed)
     effects = with_file_bounds(effects, recordings.searched[0].machine)
+    effects = of_size(effects, recordings.searched)
+    # What a file states is in its own units, whatever the machine's size.
+    effects = with_file_accuracies(effects, recordings.searched[0].testbed)
     own = searched_and_judged(recordings, effects, progress, thresholds)
     progress("parameters, and simulation of held-out data")
     data = _data(own)

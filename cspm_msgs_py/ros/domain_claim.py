@@ -14,6 +14,8 @@ from pathlib import Path
 
 from cspm_msgs_py.errors import InputError
 
+START = "/run/start"
+"""Where a leader announces the start, without a namespace."""
 _PREFIX, _NAMED = "cspm-run/", "/named/"
 _SOCKETS = Path("/proc/net/unix")
 # Of the 107 bytes of an address the domain and the longest usual namespace take less than half.
@@ -54,12 +56,17 @@ class DomainClaim:
         self._held.close()
 
 
-def refuse_claimed(domain: int, topic: str) -> None:
+def refuse_claimed(domain: int | None, topic: str = START) -> None:
     """Refuse a run in a domain that another has, before any of its nodes is started.
+
+    Args:
+        domain: the ROS domain; None: that of `ROS_DOMAIN_ID`.
+        topic: as for a claim.
 
     Raises:
         InputError: another run has it, under the same topic.
     """
+    domain = int(os.environ.get("ROS_DOMAIN_ID") or 0) if domain is None else domain
     if holder := _holder(f"{_PREFIX}{domain}{topic}"):
         raise _taken(domain, holder)
 

@@ -16,10 +16,11 @@ from collections.abc import Callable, Collection
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.ros.contract_node import ContractNode, ros_class
+from cspm_msgs_py.ros.domain_claim import START
 from cspm_msgs_py.ros.local_name import local
 from cspm_msgs_py.ros.qos import contract_qos
 
-PROGRESS, START, END = "/run/progress", "/run/start", "/run/end"
+PROGRESS, END = "/run/progress", "/run/end"
 _HEADER = "std_msgs/msg/Header"
 _NANOSECONDS = 1_000_000_000
 _LOOK_EVERY_S = 0.05

@@ -9,7 +9,7 @@ from pathlib import Path
 from cspm_model.scene.urdf import urdf
 from cspm_msgs_py.graph import Edges, graph_of, inside
 from cspm_msgs_py.ros.contract_node import ContractNode
-from cspm_msgs_py.ros.rendezvous import START
+from cspm_msgs_py.ros.domain_claim import START
 from cspm_msgs_py.scenario import ClosedLoop
 from cspm_msgs_py.schedule import TENSION, Schedule, schedule_of
 from cspm_msgs_py.stepping.drive_link import DriveLink

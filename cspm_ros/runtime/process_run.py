@@ -16,7 +16,7 @@ from cspm_msgs_py.graph import RECORDER, members_of
 from cspm_msgs_py.interruption import interruptible
 from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.overview import overview
-from cspm_msgs_py.ros.domain_claim import refuse_claimed
+from cspm_msgs_py.ros.domain_claim import START, refuse_claimed
 from cspm_msgs_py.schedule import PLANT, schedule_of
 from cspm_ros.processes.background import SHARE_BEHIND
 from cspm_ros.processes.hosted_process import NodeHost
@@ -35,8 +35,6 @@ from cspm_run.bundle import SCENARIO, Bundle
 from cspm_run.recorded_result import recorded_result
 from cspm_run.run_result import RunResult
 
-# Where the leader announces the start; the module that owns the name loads ROS.
-START = "/run/start"
 _LOOK_EVERY_S = 0.1
 # How long a run in real time goes on after a node died, to record what the others do.
 _AFTERMATH_S = 2.0
@@ -93,9 +91,7 @@ def run_processes(
         check_real_time(scenario.safety, schedule)
     # In lockstep the recorder has 48 steps of time; by the wall clock it would lose messages.
     behind = () if mode == REALTIME else (RECORDER,)
-    refuse_claimed(
-        domain_id or int(os.environ.get("ROS_DOMAIN_ID") or 0), namespace.rstrip("/") + START
-    )
+    refuse_claimed(domain_id, namespace.rstrip("/") + START)
     with ScratchFolder("run") as place:
         parameters = NodeParameters(
             plant=bundle.plant,

@@ -33,9 +33,14 @@ class DriveSaturation(NamedTuple):
     longest: float
 
     @property
+    def lasts(self) -> bool:
+        """Whether it is at its limit for stretches, in which it does not follow."""
+        return self.longest >= STRETCH_S
+
+    @property
     def words(self) -> str:
         """Share and kind, such as `sway_3 34.0 % (chatter, 9 ms at most)`."""
-        kind = "stretches, up to" if self.longest >= STRETCH_S else "chatter, at most"
+        kind = "stretches, up to" if self.lasts else "chatter, at most"
         length = f"{self.longest:.2g} s" if self.longest >= 1.0 else f"{1e3 * self.longest:.3g} ms"
         return f"{self.drive} {100.0 * self.share:.1f} % ({kind} {length})"
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from cspm_checks.drive_limit import LIMIT
+from cspm_ident.data_look.channel_checks import drives_at_limit
 from cspm_ident.diagnosis.diagnosis import Diagnosis
 from cspm_ident.diagnosis.reporting.statement import channel_of
 from cspm_ident.diagnosis.validation.residual_power import Power, lost_powers
 from cspm_ident.offline_page import table_html
-from cspm_run.run_statistics import torque_limits
-from cspm_run.stability.saturation import STRETCH_S, saturation_of
 
 
 def data_table(data: dict[str, Any]) -> str:
@@ -38,13 +36,9 @@ def saturation_table(found: Diagnosis) -> str:
     """
     rows = []
     for each in (*found.searched, *found.held_out):
-        if each.torque is None:
-            continue
-        limits = LIMIT * torque_limits(each.machine)
-        names, torque = each.machine.cable_names, each.torque
-        for drive in saturation_of(torque.times, torque.values, limits, names):
+        for drive in drives_at_limit(each):
             if drive.longest > 0.0:
-                kind = "stretches" if drive.longest >= STRETCH_S else "chatter"
+                kind = "stretches" if drive.lasts else "chatter"
                 cells = f"{100.0 * drive.share:.1f}", kind, f"{1e3 * drive.longest:.3g}"
                 rows.append((each.path.name, drive.drive.replace("_", " "), *cells))
     heads = ("recording", "drive", "share of the time [%]", "kind", "longest [ms]")

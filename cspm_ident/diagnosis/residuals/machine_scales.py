@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -77,6 +77,12 @@ def scales_of(measurements: Sequence[Measurement]) -> Scales:
     lengths = [_length(m) for m in measurements]
     found = (max(own, default=0.0) for own in (torques, speeds, forces, lengths))
     return Scales(*(own or usual for own, usual in zip(found, CATALOGUE_SCALES, strict=True)))
+
+
+def of_size(effects: Iterable[Effect], measurements: Sequence[Measurement]) -> list[Effect]:
+    """Return effects `scaled` to the machine of these recordings."""
+    scales = scales_of(measurements)
+    return [scaled(each, scales) for each in effects]
 
 
 def scaled(effect: Effect, scales: Scales) -> Effect:

@@ -13,9 +13,7 @@ from cspm_ident.diagnosis.regression.block_regression import FOLDS
 from cspm_ident.diagnosis.regression.hypothesis import Hypothesis
 from cspm_ident.diagnosis.regression.time_constants import covered_within
 from cspm_ident.diagnosis.residuals.data_split import first_part, last_part, span_of
-from cspm_ident.diagnosis.residuals.file_effects import with_file_accuracies
 from cspm_ident.diagnosis.residuals.free_shapes import Knots
-from cspm_ident.diagnosis.residuals.machine_scales import scaled, scales_of
 from cspm_ident.diagnosis.residuals.recorded_equations import equations_of
 from cspm_ident.diagnosis.residuals.regressors import Candidate, Place
 from cspm_ident.diagnosis.residuals.residual_equation import Equation, in_noise, steady
@@ -86,7 +84,7 @@ def searched_for(
 
     Args:
         recordings: the recordings to search.
-        effects: the effects to test.
+        effects: the effects to test, of the machine's size; see `of_size`.
         progress: called with the name of each step.
         thresholds: of the diagnosis.
 
@@ -131,10 +129,8 @@ def _search_pass(
 ) -> SearchPass:
     searched, held_out = recordings
     longest = max(m.duration for m in searched)
-    scales, knots = scales_of(searched), Knots()
-    # What a file states is in its own units, whatever the machine's scale.
-    stated = with_file_accuracies([scaled(e, scales) for e in effects], searched[0].testbed)
-    visible = [covered_within(e, longest) for e in stated]
+    knots = Knots()
+    visible = [covered_within(e, longest) for e in effects]
 
     def equations(measurements: Sequence[Measurement]) -> Parts:
         return [

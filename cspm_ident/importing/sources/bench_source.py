@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from cspm_ident.importing.sources.loaded_table import LoadedTable, Vector
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.installed.extra_library import extra_library
 
+Channel: TypeAlias = tuple[str, str, Vector]
+"""Group, name and values."""
 _STEP = "wf_increment"
 
 
@@ -55,20 +57,16 @@ class MdfSource(LoadedTable):
         super().__init__(path)
         library = extra_library("asammdf", "benches", str(path), ", or exported as a text table")
 
-        def groups() -> list[tuple[str, str, Vector]]:
+        def signals() -> list[Channel]:
             with library.MDF(path) as file:
-                return [
-                    (str(number), "time" if signal is None else signal.name, vector)
-                    for number, _ in enumerate(file.groups)
-                    for signal, vector in _signals(file, number)
-                ]
+                return list(_signals(file))
 
-        self._vectors = _named(path, _read(path, self.kind, groups))
+        self._vectors = _named(path, _read(path, self.kind, signals))
         self.columns = tuple(self._vectors)
 
 
-def _groups(file: Any) -> Iterable[tuple[str, str, Vector]]:  # noqa: ANN401 - of a library
-    """Yield group, name and values of each channel of a TDMS file, and of times they imply."""
+def _groups(file: Any) -> Iterable[Channel]:  # noqa: ANN401 - of a library
+    """Yield each channel of a TDMS file, and the times that waveforms imply."""
     for group in file.groups():
         channels = group.channels()
         stepped = [each for each in channels if _STEP in each.properties and len(each)]
@@ -79,20 +77,19 @@ def _groups(file: Any) -> Iterable[tuple[str, str, Vector]]:  # noqa: ANN401 - o
             yield group.name, each.name, np.asarray(each[:])
 
 
-def _signals(file: Any, group: int) -> Iterable[tuple[Any, Vector]]:  # noqa: ANN401 - as above
-    """Yield a group's stamps, then its signals, of an MDF file."""
-    master = file.masters_db.get(group)
-    if master is not None:
-        yield None, np.asarray(file.get_master(group))
-    for index, _ in enumerate(file.groups[group].channels):
-        if index != master:
-            signal = file.get(group=group, index=index)
-            yield signal, np.asarray(signal.samples)
+def _signals(file: Any) -> Iterable[Channel]:  # noqa: ANN401 - as above
+    """Yield each group's stamps, then its signals, of an MDF file."""
+    for number, group in enumerate(file.groups):
+        master = file.masters_db.get(number)
+        if master is not None:
+            yield str(number), "time", np.asarray(file.get_master(number))
+        for index, _ in enumerate(group.channels):
+            if index != master:
+                signal = file.get(group=number, index=index)
+                yield str(number), signal.name, np.asarray(signal.samples)
 
 
-def _read(
-    path: Path, kind: str, read: Callable[[], Iterable[tuple[str, str, Vector]]]
-) -> list[tuple[str, str, Vector]]:
+def _read(path: Path, kind: str, read: Callable[[], Iterable[Channel]]) -> list[Channel]:
     found, wrong = [], ""
     with _deleted_quietly():
         try:
@@ -119,7 +116,7 @@ def _deleted_quietly() -> Iterator[None]:
         sys.unraisablehook = hook
 
 
-def _named(path: Path, found: list[tuple[str, str, Vector]]) -> dict[str, Vector]:
+def _named(path: Path, found: list[Channel]) -> dict[str, Vector]:
     """Return channels by name, those that several groups have with their group's before it."""
     count = Counter(name for _, name, _ in found)
     named = {

@@ -80,6 +80,8 @@ def _fetch(address: str, part: Path, size: int, tell: Callable[[int], None]) -> 
     try:
         answer = urllib.request.urlopen(request, timeout=_SILENT_S)
     except urllib.error.HTTPError as err:
+        # A refusal holds the connection, as an answer does.
+        err.close()
         if there and err.code == _BEYOND_THE_END:
             part.unlink()
             _fetch(address, part, size, tell)

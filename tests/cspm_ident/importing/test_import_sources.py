@@ -11,7 +11,8 @@ from cspm_msgs_py.errors import InputError
 
 STATE = "/winches/state"
 ALLOWED = (
-    "allowed: a text table, .csv.gz, .json, .npz, .xlsx, .parquet, .mat or HDF5 file, or a bag"
+    "allowed: a text table, .csv.gz, .json, .npz, .xlsx, .parquet, .mat, HDF5, TDMS or MDF"
+    " file, or a bag"
 )
 MAPPING = """
 name: rig

@@ -193,11 +193,14 @@ def is_allowed(candidate: Candidate, weights: Array) -> bool:
     """Return whether the catalogue allows such weights, and they have an effect.
 
     To first order a factor is 1 + w, or exp(w) just as well: a cable of half the stiffness may have
-    a weight of −1. One of both has to be allowed.
+    a weight of −1. A gain of the compared quantity is 1/(1 − w) as well; see `of_scales`. One of
+    them has to be allowed.
     """
     effect = candidate.effect
     steps = np.where(factors_of(effect), np.expm1(np.minimum(weights, _LARGEST)), weights)
-    for each in (weights, steps):
+    inverse = effect.signature.rescales & (weights < 1.0)
+    gains = np.divide(weights, 1.0 - weights, out=weights.copy(), where=inverse)
+    for each in (weights, steps, gains):
         values = effect.values(each.tolist(), **candidate.nonlinear)
         if effect.is_plausible(values) and not effect.is_absent(values):
             return True

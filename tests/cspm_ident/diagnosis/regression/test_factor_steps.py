@@ -47,7 +47,8 @@ def test_an_offset_is_added_and_a_factor_multiplied():
         (STIFF, 20.0, False),
         (STIFF, 1e6, False),
         (LONG, -11.0, False),
-        (GAIN, -0.7, False),
+        (GAIN, -0.7, True),  # as 1/(1 + 0.7): 0.59 of the true one
+        (GAIN, -1.2, False),
     ],
 )
 def test_a_weight_is_allowed_as_a_step_or_as_its_exponential(candidate, weight, allowed):

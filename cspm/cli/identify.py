@@ -317,8 +317,8 @@ def system(
         list[Path],
         typer.Argument(
             metavar="REC...",
-            help="Recordings of one machine with bar: poses of bar and winch frame, motor angles"
-            " and, better, tensions; several lengths show more.",
+            help="Recordings of one machine with bar: poses of bar and moving winch frame, motor"
+            " angles and, better, tensions; several lengths show more.",
         ),
     ],
     testbed: MachineFile = None,

@@ -118,10 +118,10 @@ def choose(
             fitted, a value out of bounds, or a machine without bar.
     """
     frozen, priors, bounds = frozen or {}, priors or {}, bounds or {}
-    if testbed.bar is None or testbed.winch_frame is None:
+    if testbed.bar is None:
         raise InputError(
-            f"identify system: test-bed {testbed.name} has no bar or no winch frame, allowed: a"
-            " machine with both; cables on a rig: cspm identify stiffness"
+            f"identify system: test-bed {testbed.name} has no bar, allowed: a machine with one;"
+            " cables on a rig: cspm identify stiffness"
         )
     fitted = list(names or DEFAULT)
     held = [name for name in frozen if name not in fitted]

@@ -23,6 +23,8 @@ cspm new gantry --kind crossed --size 4,3,2.5 --mass 12
 
 cspm new wall --kind planar --size 3,2
 
+cspm new surveyed --survey-accuracy 0.0005 --mass-accuracy 0.01
+
 Exit code: 0 done, 2 unusable input, 130 interrupted."""
 )
 def new(
@@ -35,13 +37,27 @@ def new(
         ),
     ] = "2,2,2",
     mass: Annotated[float, typer.Option(metavar="KG", help="Mass of the platform.")] = 5.0,
+    survey_accuracy: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M",
+            help="Standard deviation of each coordinate of exits and attachments, which a diagnosis"
+            " takes for healthy; usually 0.001.",
+        ),
+    ] = None,
+    mass_accuracy: Annotated[
+        float | None,
+        typer.Option(metavar="KG", help="Standard deviation of the mass, likewise."),
+    ] = None,
     run: Annotated[bool, typer.Option(help="Whether to run the scenario.")] = True,
     json: Json = None,
 ) -> None:
     """Begin a robot of your own. Write its test-bed and scenario, check, draw and run them."""
     from cspm.commands.new_command import new_command
+    from cspm.new.files import Accuracies
 
-    new_command(name, kind, _frame(size, kind), mass, json, run=run)
+    known = Accuracies(survey_accuracy, mass_accuracy)
+    new_command(name, kind, _frame(size, kind), mass, json, known, run=run)
 
 
 def _frame(size: str, kind: str) -> tuple[float, float, float]:

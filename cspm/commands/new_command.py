@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from cspm.commands.run_command import run_command
-from cspm.new.files import scenario_text, testbed_text
+from cspm.new.files import Accuracies, scenario_text, testbed_text
 from cspm.new.layout import KINDS, layout
 from cspm_ident.diagnosis.reporting.machine_drawing import drawing
 from cspm_msgs_py.errors import InputError
@@ -27,6 +27,7 @@ def new_command(
     size: tuple[float, float, float],
     mass: float,
     json: Path | None = None,
+    known: Accuracies | None = None,
     *,
     run: bool,
 ) -> None:
@@ -37,6 +38,7 @@ def new_command(
         kind: one of `KINDS`.
         size: of its frame, x y z [m].
         mass: of its platform [kg].
+        known: how well places and mass are known; None: as usual.
         json: file for the names of what is written; None writes none.
         run: whether to run the scenario.
 
@@ -54,9 +56,13 @@ def new_command(
     for path in (machine, scenario, picture):
         if path.exists():
             raise InputError(f"{path}: already exists, allowed: a new file, or another name")
+    known = known or Accuracies()
+    for option, accuracy in zip(("survey", "mass"), known, strict=True):
+        if accuracy is not None and not 0.0 <= accuracy < np.inf:
+            raise InputError(f"--{option}-accuracy {accuracy:g}: allowed: 0 or more")
     planned = layout(kind, size)
     radius = RADIUS_SHARE * min(size[0], size[2] if planned.upright else size[1])
-    machine.write_text(testbed_text(name, planned, mass), encoding="utf-8")
+    machine.write_text(testbed_text(name, planned, mass, known), encoding="utf-8")
     scenario.write_text(scenario_text(name, machine.name, planned, radius), encoding="utf-8")
     pose = np.array(load_scenario(scenario).bar_mean_pose)
     svg = drawing(load_testbed(machine).testbed, pose, None, ())

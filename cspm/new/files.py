@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi
+from typing import NamedTuple
 
 from cspm.new.layout import Layout, Line
 
@@ -19,24 +20,43 @@ LOWEST, HIGHEST, RESERVE = 0.02, 1.6, 1.5
 GRAVITY = 9.81
 
 
-def testbed_text(name: str, layout: Layout, mass: float) -> str:
+class Accuracies(NamedTuple):
+    """How well numbers are known, one standard deviation; None: as usual, so not in the file.
+
+    Attributes:
+        survey: of each coordinate of exits and attachments [m].
+        mass: of the platform's mass [kg].
+    """
+
+    survey: float | None = None
+    mass: float | None = None
+
+
+def testbed_text(name: str, layout: Layout, mass: float, known: Accuracies) -> str:
     """Return the test-bed file of a robot of `mass` [kg], with comments."""
-    first, *others = layout.lines
-    more = "".join(f"  - <<: *winch\n{_cable(line)}\n" for line in others)
+    first, *others = (_cable(line, known.survey) for line in layout.lines)
+    more = "".join(f"  - <<: *winch\n{cable}\n" for cable in others)
     head = "SI units, radians, z down. Replace every number; keys: docs/reference/testbed-file.md"
     return (
-        f"# {head}\nname: {name}\n{_platform(layout.half, mass)}"
-        f"cables: # a winch each\n  - &winch\n{_cable(first)}\n{_winch(mass)}{more}"
+        f"# {head}\nname: {name}\n{_platform(layout.half, mass, known.mass)}"
+        f"cables: # a winch each\n  - &winch\n{first}\n{_winch(mass)}{more}"
         f"{_sensors(HIGHEST * mass * GRAVITY)}"
     )
 
 
-def _platform(half: float, mass: float) -> str:
+def _known(value: str, accuracy: float | None) -> str:
+    """Return a value, with its accuracy where that is known."""
+    if accuracy is None:
+        return value
+    return f"{{value: {value}, provenance: measured, accuracy: {accuracy:g}}}"
+
+
+def _platform(half: float, mass: float, accuracy: float | None) -> str:
     moment, side = mass * (2.0 * half) ** 2 / 6.0, f"{2.0 * half:.4g}"
     inertia = f"{{ixx: {moment:.4g}, iyy: {moment:.4g}, izz: {moment:.4g}}}"
     return f"""\
 bar: # the platform; attachments and poses count from its origin
-  mass: {mass:g} # kg, with its load
+  mass: {_known(f"{mass:g}", accuracy)} # kg, with its load
   inertia: {inertia} # kg·m², about the centre of mass
   com: [0.0, 0.0, 0.0] # m, the centre of mass from the platform's origin
   dimensions: [{side}, {side}, {side}] # m, for drawing
@@ -99,10 +119,11 @@ requirement: {{position: 0.01, angle: 0.01}} # m, rad: what `cspm run` judges er
 """
 
 
-def _cable(line: Line) -> str:
-    exit_, attachment = (", ".join(f"{v + 0.0:.4g}" for v in p) for p in line[1:])
+def _cable(line: Line, accuracy: float | None) -> str:
+    places = (", ".join(f"{v + 0.0:.4g}" for v in p) for p in line[1:])
+    exit_, attachment = (_known(f"[{place}]", accuracy) for place in places)
     return (
         f"    name: {line.name}\n"
-        f"    exit: [{exit_}] # m, where the cable leaves its last pulley, in the world\n"
-        f"    attachment: [{attachment}] # m, on the platform"
+        f"    exit: {exit_} # m, where the cable leaves its last pulley, in the world\n"
+        f"    attachment: {attachment} # m, on the platform"
     )

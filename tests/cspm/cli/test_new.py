@@ -10,6 +10,7 @@ import cspm
 from cspm.commands.new_command import new_command
 from cspm.new.layout import KINDS
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.testbed import load_testbed
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "tutorials" / "your-robot.md"
 SIX = ["surge", "sway", "heave", "roll", "pitch", "yaw"]
@@ -60,6 +61,20 @@ def test_each_fault_is_one_line_and_writes_nothing(here, given, text):
         new_command(*given, run=False)
     assert text in str(caught.value)
     assert not list(here.iterdir())
+
+
+def test_accuracies_are_in_the_file_where_they_are_given(here, cspm):
+    given = ["--survey-accuracy", "0.0005", "--mass-accuracy", "0.01"]
+    assert cspm("new", "known", *given, "--no-run")[0] == 0
+    assert cspm("new", "usual", "--no-run")[0] == 0
+    known, usual = (load_testbed(here / f"{name}_testbed.yaml") for name in ("known", "usual"))
+    assert known.testbed.cables == usual.testbed.cables
+    places = [f"cables[{i}].{end}" for i in range(4) for end in ("exit", "attachment")]
+    expected = dict.fromkeys(places, 0.0005) | {"bar.mass": 0.01}
+    assert {path: about.accuracy for path, about in known.provenance.items()} == expected
+    assert usual.provenance == {}
+    code, _, err = cspm("new", "wrong", "--survey-accuracy", "-1")
+    assert (code, err) == (2, "cspm new: --survey-accuracy -1: allowed: 0 or more\n")
 
 
 def test_a_planar_robot_has_a_size_of_two_numbers(here, cspm):

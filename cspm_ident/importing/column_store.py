@@ -61,6 +61,8 @@ class ColumnStore:
         name = self._prefix + name
         if name not in self._paths:
             self._begin(name, piece.dtype)
+        elif piece.dtype == np.longdouble != self._kinds[name]:
+            self._widen(name)
         with self._paths[name].open("ab") as file:
             file.write(np.ascontiguousarray(piece, dtype=self._kinds[name]).data)
 
@@ -74,6 +76,16 @@ class ColumnStore:
         self._paths[name] = self._folder.path / f"{len(self._paths)}.bin"
         self._paths[name].touch()
         self._kinds[name] = kind
+
+    def _widen(self, name: str) -> None:
+        """Store a column anew as longdouble, as its next piece needs."""
+        narrow, kind = self._paths[name], self._kinds[name]
+        self._kinds[name] = np.dtype(np.longdouble)
+        self._paths[name] = narrow.with_suffix(".long")
+        with narrow.open("rb") as file, self._paths[name].open("wb") as wide:
+            while piece := file.read(PIECE * kind.itemsize):
+                wide.write(np.frombuffer(piece, dtype=kind).astype(np.longdouble).data)
+        narrow.unlink()
 
     def column(self, name: str) -> Array:
         """Return a column, shape (n,), read from disk as it is used; empty if nothing was added."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ class Conversion:
     factor: float
     offset: float = 0.0
     wrap: float | None = None
-    invalid: tuple[float, ...] = ()
+    invalid: tuple[int | float, ...] = ()
 
     @property
     def formula(self) -> str:
@@ -47,18 +48,18 @@ class Conversion:
         """Return what makes the raw numbers continuous, None if they are."""
         return None if self.wrap is None else Unwrapper(self.wrap)
 
-    def apply(self, raw: Array, unwrapper: Unwrapper | None) -> Array:
-        """Return SI values of the next piece of a column, shape (n,).
+    def apply(self, raw: NDArray[Any], unwrapper: Unwrapper | None) -> Array:
+        """Return SI values of the next piece of a column, shape (n,), float64 or longdouble.
 
         Raw values that are `invalid` or infinite become NaN.
         """
         bad = np.isinf(raw)
         for value in self.invalid:
-            bad |= raw == value
+            bad |= raw == raw.dtype.type(value)
         values = np.where(bad, np.nan, raw)
         if unwrapper is not None:
             values = unwrapper.take(values)
-        return self.factor * values + self.offset
+        return np.asarray(self.factor * values + self.offset, dtype=np.float64)
 
 
 def conversion_of(source: ChannelSource, quantity: str, where: str) -> Conversion:

@@ -130,7 +130,7 @@ class ChannelSource(StrictModel):
     sign: Literal[1, -1] = 1
     scale: float | None = None
     offset: float = 0.0
-    invalid: tuple[float, ...] = ()
+    invalid: tuple[int | float, ...] = ()
     spikes: Literal["keep", "mask"] = "keep"
     jumps: Literal["keep", "join"] = "keep"
 

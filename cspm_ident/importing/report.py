@@ -122,7 +122,7 @@ def topic_report(
     fields = []
     for field in planned.fields:
         places = messages.places[field.name]
-        first = [] if places is None else raw[field.column or ""][places[:FIRST_ROWS]].tolist()
+        rows = np.zeros(0) if places is None else raw[field.column or ""][places[:FIRST_ROWS]]
         found = statistics_of(partial(messages.values, field.name), len(messages.stamp_ns))
         fields.append(
             FieldReport(
@@ -130,7 +130,7 @@ def topic_report(
                 source=field.column or "constant",
                 quantity=field.conversion.quantity if field.conversion else "",
                 formula=field.conversion.formula if field.conversion else _constant(field),
-                raw=first,
+                raw=rows.astype(np.float64).tolist(),
                 converted=messages.values(field.name, slice(FIRST_ROWS)).tolist(),
                 low=found.low,
                 high=found.high,

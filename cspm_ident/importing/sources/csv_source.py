@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from cspm_ident.importing.column_store import ColumnStore
 from cspm_ident.importing.mapping import CsvFormat
+from cspm_ident.importing.sources.exact_numbers import may_be_rounded
 from cspm_ident.importing.sources.number_text import is_number
 from cspm_ident.importing.sources.row_choice import Labels
 from cspm_ident.importing.sources.row_shape import RowShape
@@ -156,6 +157,10 @@ class CsvSource(TableSource):
         except ValueError:
             text = [self._filled(row) for row in text]
             table = self._load_or_blame(text, kind, places, line, exact)
+        long = {p for p in places if p not in exact and may_be_rounded(table[str(p)])}
+        if long:
+            kind = np.dtype([(n, "g" if int(n) in long else kind[n]) for n in kind.names or ()])
+            table = self._load(text, kind, places)
         # An open quote swallows lines in silence.
         if any('"' in row for row in lines):
             rows = sum(not self._rows.is_void(row) for row in lines)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cspm_ident.importing.sources.exact_numbers import exact_numbers
 from cspm_ident.importing.sources.loaded_table import LARGEST_SIDE, LoadedTable, Vector, signals
 from cspm_ident.importing.sources.mat_source import EXPORT
 from cspm_msgs_py.errors import InputError
@@ -86,7 +87,7 @@ def _scaled(node: Any) -> Vector:  # noqa: ANN401 - of h5py
         return values
     holes = np.isin(values, [np.ravel(packing[key])[0] for key in HOLES if key in packing])
     scale, offset = (float(np.ravel(packing.get(key, one))[0]) for key, one in LINEAR.items())
-    return np.where(holes, np.nan, values * scale + offset)
+    return np.where(holes, np.nan, exact_numbers(values) * scale + offset)
 
 
 def _arrays(name: str, value: Vector, *, matlab: bool) -> list[tuple[str, Vector]]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cspm_ident.importing.sources.exact_numbers import exact_numbers
 from cspm_ident.importing.sources.loaded_table import LoadedTable, Vector, signals
 from cspm_msgs_py.errors import InputError
 
@@ -86,6 +87,6 @@ def _array(value: Any) -> Vector | None:  # noqa: ANN401 - any JSON
         return np.array([str(each) for each in value])
     try:
         # None, where a record lacks a value, becomes NaN.
-        return np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+        return exact_numbers(value)
+    except (TypeError, ValueError, OverflowError):
         return None

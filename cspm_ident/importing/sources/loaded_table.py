@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.importing.column_store import ColumnStore
+from cspm_ident.importing.sources.exact_numbers import exact_numbers, spacing_of
 from cspm_ident.importing.sources.row_choice import Labels
 from cspm_ident.importing.sources.source import Progress
 from cspm_ident.importing.sources.table_source import TableSource
@@ -56,11 +57,16 @@ class LoadedTable(TableSource):
             else:
                 found = self._numbers(name, vector)
             store.append(name, found)
+            if vector.dtype == np.float64 and (step := spacing_of(vector)) > 1.0:
+                self.notes.append(
+                    f"column '{name}' holds whole numbers from 2⁵³ on in double precision, which"
+                    f" rounds them to {step:.0f}; stored as 64-bit integers they are exact"
+                )
             progress(count / len(wanted))
 
-    def _numbers(self, name: str, vector: Vector) -> NDArray[np.float64]:
+    def _numbers(self, name: str, vector: Vector) -> NDArray[Any]:
         if vector.dtype.kind in "biuf":
-            return vector.astype(np.float64)
+            return exact_numbers(vector)
         raise InputError(
             f"{self.path}: column '{name}' holds {_kind(vector)}, allowed: numbers; dates and texts"
             " as the column of a clock"

@@ -7,6 +7,8 @@ import re
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from cspm_msgs_py.errors import InputError
 
 _NAME = re.compile(r"^(?P<topic>/[^:]+):(?P<path>[\w.\[\]/ -]+)$")
@@ -90,7 +92,8 @@ class MessagePath:
                 return float(values[self._index])
         try:
             node = self._walk(message, self._steps, number)
-            return node if node is ABSENT else float(node)
+            whole = isinstance(node, int | np.integer)  # of 64 bits, which float rounds
+            return node if whole or node is ABSENT else float(node)
         except (AttributeError, LookupError, TypeError, ValueError):
             raise InputError(
                 f"{self._where}: {self._type} has no number '{self.what}', {_fields(message)}"

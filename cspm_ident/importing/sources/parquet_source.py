@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cspm_ident.importing.sources.exact_numbers import exact_numbers
 from cspm_ident.importing.sources.loaded_table import LoadedTable, Vector
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.installed.extra_library import extra_library
@@ -35,8 +36,12 @@ class ParquetSource(LoadedTable):
     def _vector(self, name: str) -> Vector:
         try:
             found = self._file.read(columns=[name]).column(name)
-            if str(found.type).startswith("decimal"):
-                found = found.cast("double")
+            kind, holes = str(found.type), found.is_null().to_numpy()
+            if kind.startswith("decimal"):
+                texts = found.cast("string").fill_null("nan").to_numpy(zero_copy_only=False)
+                return np.asarray(texts.astype(str).astype(np.longdouble))
+            if "int" in kind and holes.any():
+                return np.where(holes, np.nan, exact_numbers(found.fill_null(0).to_numpy()))
             return np.asarray(found.to_numpy(zero_copy_only=False))
         except Exception as err:  # see above
             raise InputError(

@@ -64,7 +64,10 @@ class Labels:
 
 def plain(text: str) -> str:
     """Return a text without blanks around it, and a number without needless digits."""
+    text = text.strip()
+    if text.isdecimal():
+        return str(int(text))
     try:
         return f"{float(text):.12g}"
     except ValueError:
-        return text.strip()
+        return text

@@ -45,7 +45,8 @@ class Source(Protocol):
         """Put columns into a store under their names.
 
         Args:
-            numbers: columns to be stored as float64.
+            numbers: columns to be stored as float64, as longdouble where that would round whole
+                numbers.
             times: columns to be stored with every digit, as longdouble, and their units where
                 the mapping says them; texts are stored in ns.
             store: gets them.

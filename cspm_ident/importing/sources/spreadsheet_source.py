@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cspm_ident.importing.mapping import CsvFormat
+from cspm_ident.importing.sources.exact_numbers import exact_numbers
 from cspm_ident.importing.sources.loaded_table import LoadedTable, Vector
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.installed.extra_library import extra_library
@@ -110,7 +111,7 @@ class SpreadsheetSource(LoadedTable):
             return np.array(found, dtype="datetime64[ns]")
         if known and all(isinstance(cell, str | time) for cell in known):
             return np.array(["" if cell in absent else _text(cell) for _, cell in cells])
-        values = np.full(len(cells), np.nan)
+        values: list[float] = [np.nan] * len(cells)
         for i, (number, cell) in enumerate(cells):
             if cell in absent:
                 continue
@@ -120,7 +121,7 @@ class SpreadsheetSource(LoadedTable):
                     " nothing, or a text named in csv.missing"
                 )
             values[i] = cell
-        return values
+        return exact_numbers(values)
 
 
 def _text(cell: Any) -> str:  # noqa: ANN401 - what a cell holds

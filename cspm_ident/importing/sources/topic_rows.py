@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cspm_ident.importing.column_store import ColumnStore
+from cspm_ident.importing.sources.exact_numbers import exact_numbers
 from cspm_ident.importing.sources.message_path import (
     ABSENT,
     HEADER,
@@ -84,7 +85,7 @@ class SelectedRows:
             if name in self._stamps:
                 piece = np.array(values, dtype=np.int64).astype(np.longdouble)
             else:
-                piece = np.array(values, dtype=np.float64)
+                piece = exact_numbers(values)
             store.append(name, piece)
             values.clear()
 

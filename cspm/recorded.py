@@ -52,6 +52,7 @@ class Recording(Signals):
             self.attachments: Mapping[str, bytes] = reader.attachments
             self.metadata: Mapping[str, Mapping[str, str]] = reader.metadata
             self.complete = reader.complete
+            self.left_out = reader.left_out
         self._found: dict[str, tuple[Topic, Rows]] = {}
 
     @property

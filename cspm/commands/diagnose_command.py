@@ -121,10 +121,12 @@ def believed_line(machine: Testbed, file: Path | None) -> str:
 
 
 def _print_cut_short(console: Console, found: Diagnosis) -> None:
-    """Print which recordings were cut short because their writer was killed."""
+    """Print which recordings were cut short because their writer was killed, or read in part."""
     for each in (*found.searched, *found.held_out):
         if not each.complete:
             say(console, f"{each.path}: was not closed; {each.duration:.1f} s of it are readable")
+        for line in each.left_out:
+            say(console, line)
 
 
 def _print_parity(console: Console, parity: Sequence[Parity]) -> None:

@@ -105,6 +105,8 @@ def recover_command(bag: Path, out: Path | None, json: Path | None) -> None:
     if report.bare:
         names = ", ".join(path.name for path in report.bare)
         say(console, f"{names}: holds nothing, left out")
+    for line in report.left_out:
+        say(console, line)
     if not report.restored:
         done = "metadata.yaml was written" if report.described else "nothing to restore"
         say(console, f"{report.path}: complete, {done}")

@@ -56,6 +56,7 @@ class Measurement:
             drive reports what it held since the stamp before: half a period. Of others nothing is
             known, and 0 is taken.
         complete: whether whatever wrote the recording closed it.
+        left_out: lines about messages with impossible log times.
         assumed: a machine that is assumed instead of the described one; None: the described one.
     """
 
@@ -72,6 +73,7 @@ class Measurement:
     wanted: Samples | None = None
     torque_age: float = 0.0
     complete: bool = True
+    left_out: tuple[str, ...] = ()
     assumed: Testbed | None = None
 
     @property
@@ -155,7 +157,7 @@ def read_measurement(path: Path, testbed: Path | TestbedFile | None = None) -> M
         rows = recording.rows_of([*names, *reference_topics])
         found = {name: recording.topic(name) for name in names}
         simulated = simulated_plant(recording) is not None
-        closed = recording.complete
+        closed, left_out = recording.complete, tuple(recording.left_out)
     if not names:
         raise InputError(f"{path}: no measured topic, allowed: at least one of {', '.join(wanted)}")
     _check_cables(found, machine.testbed, path)
@@ -175,6 +177,7 @@ def read_measurement(path: Path, testbed: Path | TestbedFile | None = None) -> M
         wanted=_wanted(rows, start) if reference_topics else None,
         torque_age=age,
         complete=closed,
+        left_out=left_out,
         assumed=None,
     )
 

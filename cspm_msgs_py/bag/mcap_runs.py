@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cspm_msgs_py.bag.run import LATEST_NS, StoredChannel, StoredMessage, StoredRun
+from cspm_msgs_py.bag.run import StoredChannel, StoredMessage, StoredRun
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.chunk import ChunkPlace, Messages
 from cspm_msgs_py.recording.mcap_file import McapFile
@@ -42,6 +42,7 @@ class McapRuns:
                     " restores its index"
                 )
             spans = self._spans()
+            self.faults += self._file.left_out
             self.channels = _channels(self._file)
             self.runs = [
                 StoredRun(*span, partial(self._read, place, span)) for place, span in spans
@@ -55,7 +56,7 @@ class McapRuns:
         found, readable = [], []
         for place in self._file.chunks:
             try:
-                span = self._span(place)
+                span = self._file.span(place)
                 self._file.times(place)
             except InputError as err:
                 self._fault(err)
@@ -70,26 +71,6 @@ class McapRuns:
         if not self._tolerant:
             raise err
         self.faults.append(f"{err}: left out; `cspm recover` leaves it out as well")
-
-    def _span(self, place: ChunkPlace) -> _SpanNs | None:
-        """Return first and last log time of a chunk [ns], None if it has no message."""
-        if not place.loose:
-            head = self._file.head(place)
-            # Writers say 0 or nonsense of a chunk without messages, and 0 may also be a log time.
-            if 0 < head.first_ns <= head.last_ns:
-                return self._checked(place, head.first_ns, head.last_ns)
-        times = [table[:, 0] for table in self._file.times(place).values() if len(table)]
-        if not times:
-            return None
-        first, last = min(int(t.min()) for t in times), max(int(t.max()) for t in times)
-        return self._checked(place, first, last)
-
-    def _checked(self, place: ChunkPlace, first_ns: int, last_ns: int) -> _SpanNs:
-        if last_ns > LATEST_NS:
-            raise InputError(
-                f"{self._where(place)}: log time {last_ns} ns, allowed: up to {LATEST_NS} ns"
-            )
-        return first_ns, last_ns
 
     def _read(
         self, place: ChunkPlace, span: _SpanNs, channels: Collection[int], start_ns: int

@@ -9,8 +9,6 @@ from heapq import heappop, heappush, heapreplace
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-LATEST_NS = 2**63 - 1
-
 
 class BagMessage(NamedTuple):
     """One message of a bag.

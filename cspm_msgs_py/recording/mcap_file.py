@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections import Counter
+from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 
 from mcap.records import (
@@ -33,6 +36,7 @@ from cspm_msgs_py.recording.chunk import (
     read_index,
     read_messages,
 )
+from cspm_msgs_py.recording.log_time import LATEST_NS, in_time, index_in_time, left_out
 from cspm_msgs_py.recording.records import (
     HEAD,
     MAGIC,
@@ -304,7 +308,50 @@ class McapFile(Closing):
         """
         if not self.complete and place is self.chunks[-1]:
             return None
-        return read_index(self.record_bytes(place.record.end, place.index_end))
+        stored = read_index(self.record_bytes(place.record.end, place.index_end))
+        return None if stored is None else index_in_time(stored)
+
+    def late_in(self, place: ChunkPlace) -> Counter[int]:
+        """Return how many of a chunk's messages are left out, see `log_time`, by channel id.
+
+        Raises:
+            InputError: the chunk is damaged.
+        """
+        if not place.loose and self.head(place).last_ns <= LATEST_NS:
+            return Counter()
+        stored = read_messages(self.chunk_content(place), None, self._where(place))
+        return Counter(stored.channels[stored.prefixes["log"] > LATEST_NS].tolist())
+
+    @cached_property
+    def late(self) -> Counter[int]:
+        """Number of messages that are left out, see `log_time`, by channel id."""
+        found: Counter[int] = Counter()
+        if self.statistics is None or self.statistics.message_end_time > LATEST_NS:
+            for place in self.chunks:
+                with suppress(InputError):
+                    found += self.late_in(place)
+        return found
+
+    @property
+    def left_out(self) -> list[str]:
+        """What there is to say of messages that are left out, a line or none."""
+        return left_out(self.path, self.late.total())
+
+    def span(self, place: ChunkPlace) -> tuple[int, int] | None:
+        """Return first and last log time of a chunk [ns], None if it has no message.
+
+        Raises:
+            InputError: the chunk is damaged.
+        """
+        if not place.loose:
+            head = self.head(place)
+            # Writers say 0 or nonsense of a chunk without messages, and 0 may also be a log time.
+            if 0 < head.first_ns <= head.last_ns <= LATEST_NS:
+                return head.first_ns, head.last_ns
+        times = [table[:, 0] for table in self.times(place).values() if len(table)]
+        if not times:
+            return None
+        return min(int(t.min()) for t in times), max(int(t.max()) for t in times)
 
     def head(self, place: ChunkPlace) -> ChunkHead:
         """Return what precedes a chunk's data.
@@ -353,7 +400,7 @@ class McapFile(Closing):
             InputError: it is damaged.
         """
         content = self.chunk_content(place)
-        return read_messages(content, index or self.index(place), self._where(place))
+        return in_time(read_messages(content, index or self.index(place), self._where(place)))
 
     def times(self, place: ChunkPlace) -> ChunkIndex:
         """Return log time and offset of each message of a chunk, shape (n, 2), by channel id.
@@ -369,7 +416,7 @@ class McapFile(Closing):
         head = self.head(place)
         for table in index.values():
             if len(table) and not (
-                head.first_ns <= table[:, 0].min() <= table[:, 0].max() <= head.last_ns < 2**63
+                head.first_ns <= table[:, 0].min() <= table[:, 0].max() <= head.last_ns
             ):
                 raise InputError(f"{self._where(place)}: its index has other times than it")
         return index

@@ -196,7 +196,7 @@ def _mcap_overview(recording: Recording, faults: list[str], damaged: list[str]) 
         profile=files[0].profile,
         library=files[0].library,
         complete=recording.complete,
-        faults=[*faults, *damaged],
+        faults=[*faults, *damaged, *recording.left_out],
         unread_bytes=sum(0 if file.complete else file.size - file.end for file in files),
         size_bytes=sum(file.size for file in files),
         start_ns=recording.start_ns,

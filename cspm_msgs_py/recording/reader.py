@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cspm_msgs_py.closing import Closing
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.message import carries_row
-from cspm_msgs_py.recording.chunk import ChunkPlace, Messages
+from cspm_msgs_py.recording.chunk import Messages
 from cspm_msgs_py.recording.mcap_file import BareFileError, McapFile
 from cspm_msgs_py.recording.rosbag2_metadata import read_bag
 from cspm_msgs_py.recording.rows import RowCollector, Rows
@@ -93,6 +93,11 @@ class Recording(Closing):
         """Whether all files were closed by whatever wrote them."""
         return not self.bare and all(file.complete for file in self.files)
 
+    @property
+    def left_out(self) -> list[str]:
+        """What there is to say of messages that are left out, a line a file; see `log_time`."""
+        return [line for file in self.files for line in file.left_out]
+
     @cached_property
     def topics(self) -> dict[str, TopicInfo]:
         """Type and number of messages by topic name."""
@@ -135,8 +140,8 @@ class Recording(Closing):
         first, last = 2**64 - 1, -1
         for file in self.files:
             for place in file.chunks:
-                begin, end = _span_of(file, place)
-                first, last = min(first, begin), max(last, end)
+                if span := file.span(place):
+                    first, last = min(first, span[0]), max(last, span[1])
         return (first, last) if last >= 0 else (0, 0)
 
     @property
@@ -237,7 +242,8 @@ class Recording(Closing):
             }
             wanted = {channel for channels in ids.values() for channel in channels}
             for place in file.chunks[after:]:
-                if until_ns is not None and _span_of(file, place)[0] > until_ns:
+                span = None if until_ns is None else file.span(place)
+                if until_ns is not None and (span is None or span[0] > until_ns):
                     continue
                 index = file.index(place)
                 if index is None or not wanted.isdisjoint(index):
@@ -288,15 +294,6 @@ class Recording(Closing):
             file.close()
 
 
-def _span_of(file: McapFile, place: ChunkPlace) -> tuple[int, int]:
-    """Return the earliest and latest log time of a chunk [ns]."""
-    if place.loose:
-        logs = file.messages(place).logs
-        return int(logs.min()), int(logs.max())
-    head = file.head(place)
-    return head.first_ns, head.last_ns
-
-
 def mcap_paths(path: Path, *, compressions: Sequence[str] = ("none",)) -> list[Path]:
     """Return the MCAP files of a recording: the file itself, or those of a rosbag2 folder.
 
@@ -326,7 +323,7 @@ def message_type(file: McapFile, channel: Channel) -> str:
 def message_counts(file: McapFile) -> Counter[int]:
     """Return the number of messages by channel id, from the statistics or else the indexes."""
     if file.complete and file.statistics is not None:
-        return Counter(file.statistics.channel_message_counts)
+        return Counter(file.statistics.channel_message_counts) - file.late
     counts: Counter[int] = Counter()
     for place in file.chunks:
         counts.update({channel: len(table) for channel, table in file.times(place).items()})

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
@@ -24,6 +24,7 @@ from cspm_msgs_py.recording.chunk import (
     other_records,
     scan_messages,
 )
+from cspm_msgs_py.recording.log_time import in_time, left_out, rewritten
 from cspm_msgs_py.recording.mcap_file import BareFileError, McapFile
 from cspm_msgs_py.recording.reader import message_counts, message_type
 from cspm_msgs_py.recording.records import HEAD, Opcode, parse, spans_in
@@ -42,6 +43,14 @@ _COMPRESSION_LEVEL = 1
 Item = TypeVar("Item")
 
 
+class _Result(NamedTuple):
+    """What of one file is not in its copy: damaged records, unused bytes, and lines on the rest."""
+
+    damaged: int
+    lost_bytes: int
+    left_out: list[str]
+
+
 @dataclass(frozen=True)
 class RecoveryReport:
     """What was restored.
@@ -56,6 +65,7 @@ class RecoveryReport:
         bare: files left out because they hold nothing.
         described: whether `metadata.yaml` was written.
         lost_bytes: what could not be used at the ends of the files [bytes].
+        left_out: lines about messages with impossible log times; see `log_time`.
     """
 
     path: Path
@@ -67,6 +77,7 @@ class RecoveryReport:
     lost_bytes: int
     bare: list[Path]
     described: bool
+    left_out: list[str]
 
     @property
     def messages(self) -> int:
@@ -136,15 +147,14 @@ def _is_bare(path: Path) -> bool:
 def _restore_in_place(
     path: Path, files: list[Path], bare: list[Path], *, packed: bool
 ) -> RecoveryReport:
-    restored, kept, damaged, lost = [], [], 0, 0
+    restored, kept, results = [], [], list[_Result]()
     for file in files:
         if _is_whole(file):
             continue
         broken, beside = Path(f"{file}{BROKEN_SUFFIX}"), Path(f"{file}.restoring")
         if broken.exists():
             raise InputError(f"{broken}: already exists, allowed: move it away first")
-        result = _restore(file, beside)
-        damaged, lost = damaged + result[0], lost + result[1]
+        results.append(_restore(file, beside))
         _exchange(file, beside, broken)
         restored.append(file)
         kept.append(broken)
@@ -153,8 +163,8 @@ def _restore_in_place(
     if path.is_dir() or (folder / FILE_NAME).exists():
         files, packed = (files, packed) if path.is_dir() else _files(folder)
         write = bool(restored or bare) or not _has_metadata(folder)
-    counts, end = _describe(folder, files, write=write, packed=packed)
-    return RecoveryReport(path, restored, kept, counts, end, damaged, lost, bare, write)
+    found = _describe(folder, files, write=write, packed=packed)
+    return _report(path, restored, kept, found, results, bare, described=write)
 
 
 def _has_metadata(folder: Path) -> bool:
@@ -167,13 +177,27 @@ def _has_metadata(folder: Path) -> bool:
 def _restore_to(files: list[Path], bare: list[Path], out: Path, *, packed: bool) -> RecoveryReport:
     refuse_existing(out)
     out.mkdir(parents=True)
-    targets, damaged, lost = [], 0, 0
+    targets, results = [], []
     for i, file in enumerate(files):
         targets.append(out / f"{out.name}_{i}.mcap")
-        result = _restore(file, targets[-1])
-        damaged, lost = damaged + result[0], lost + result[1]
-    counts, end = _describe(out, targets, write=True, packed=packed)
-    return RecoveryReport(out, targets, files, counts, end, damaged, lost, bare, described=True)
+        results.append(_restore(file, targets[-1]))
+    found = _describe(out, targets, write=True, packed=packed)
+    return _report(out, targets, files, found, results, bare, described=True)
+
+
+def _report(
+    path: Path,
+    restored: list[Path],
+    kept: list[Path],
+    found: tuple[dict[str, int], int],
+    results: list[_Result],
+    bare: list[Path],
+    *,
+    described: bool,
+) -> RecoveryReport:
+    damaged, lost = sum(r.damaged for r in results), sum(r.lost_bytes for r in results)
+    late = [line for each in results for line in each.left_out]
+    return RecoveryReport(path, restored, kept, *found, damaged, lost, bare, described, late)
 
 
 def _exchange(file: Path, beside: Path, broken: Path) -> None:
@@ -189,30 +213,30 @@ def _is_whole(path: Path) -> bool:
     try:
         with McapFile(path) as file:
             listed = bool(file.statistics or file.chunks or not file.channels)
-            return file.complete and listed and not file.drop_damaged()
+            return file.complete and listed and not file.drop_damaged() and not file.late
     except InputError:
         return False
 
 
-def _restore(path: Path, target: Path) -> tuple[int, int]:
-    """Write what is whole in a file to `target`; return damaged records and unused bytes."""
+def _restore(path: Path, target: Path) -> _Result:
+    """Write what is whole in a file to `target`; return what is not."""
     with McapFile(path, use_summary=False) as source:
         tail, rest = _tail(source)
         _take_definitions(source, tail)
         source.check_not_bare()
         sink = McapSink(target, Header(source.profile, source.library))
         try:
-            damaged = _copy(source, tail, sink)
+            damaged, late = _copy(source, tail, sink)
             sink.finish()
         except BaseException:
             sink.close()
             target.unlink(missing_ok=True)
             raise
-        return damaged, rest
+        return _Result(damaged, rest, left_out(path, late))
 
 
-def _copy(source: McapFile, tail: bytes, sink: McapSink) -> int:
-    damaged = 0
+def _copy(source: McapFile, tail: bytes, sink: McapSink) -> tuple[int, int]:
+    damaged, late = 0, source.late.total()
     for schema in source.schemas.values():
         sink.add_schema(schema)
     for channel in source.channels.values():
@@ -226,10 +250,12 @@ def _copy(source: McapFile, tail: bytes, sink: McapSink) -> int:
     for place in source.chunks:
         damaged += not _copy_chunk(source, place, sink, compressor)
     if tail:
-        index = scan_messages(tail, str(source.path)).index()
-        if index:
-            sink.add_chunk(compress(tail, index, compressor), index)
-    return damaged
+        whole = scan_messages(tail, str(source.path))
+        kept = rewritten(in_time(whole), str(source.path))
+        late += len(whole) - len(kept)
+        if index := kept.index():
+            sink.add_chunk(compress(kept.content, index, compressor), index)
+    return damaged, late
 
 
 def _try(get: Callable[[Any], Item], place: object, put: Callable[[Any], None]) -> bool:
@@ -247,12 +273,14 @@ def _copy_chunk(
     """Copy a chunk and index it anew; return whether it was whole."""
     try:
         head, messages = source.head(place), source.messages(place)
+        late = source.late_in(place)
+        messages = rewritten(messages, str(source.path)) if late else messages
     except InputError:
         return False
     index = messages.index()
     if not index:
         return True
-    if place.loose:
+    if place.loose or late:
         chunk = compress(messages.content, index, compressor)
     else:
         logs = messages.prefixes["log"]

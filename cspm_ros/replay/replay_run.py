@@ -76,11 +76,13 @@ def replay(
         look: called some 20 times a second with the player.
         paused: whether to begin paused.
         domain_id: instead of `ROS_DOMAIN_ID`.
-        notify: gets a line about each topic that cannot be played.
+        notify: gets a line about what is missing in the bag, and each topic that cannot be played.
 
     Raises:
         InputError: the bag does not have what is to be played, or is damaged.
     """
+    for fault in bag.faults:
+        notify(fault)
     with Session(domain_id=domain_id) as session:
         node = PlayerNode(session.node(PLAYER), bag, selection, _in_time(rate), paused=paused)
         return _play_in_time(session, node, look, notify)

@@ -102,13 +102,13 @@ def _of_recording(path: Path, testbed: Path | None) -> Checked:
             machine = attached_testbed(opened.attachments, path)
         else:
             machine = named_testbed(testbed)
-        log = recorded_columns(opened)
+        log, left_out = recorded_columns(opened), opened.left_out
     if not log:
         raise InputError(f"{path}: no topic of a sensor, allowed: at least one; or --mapping FILE")
     origin = min(int(one.stamp_ns.min()) for one in log.values())
     found = look_at(log, machine.testbed, origin, {})
     paces = {name: pace_of(one.stamp_ns, origin) for name, one in log.items()}
-    return Checked(paces, found.suspicions, found.unjudged, origin * 1e-9)
+    return Checked(paces, found.suspicions, [*left_out, *found.unjudged], origin * 1e-9)
 
 
 def _of_log(path: Path, mapping: MappingFile, testbed: TestbedFile) -> Checked:

@@ -39,6 +39,8 @@ def export_command(bag: Path, out: Path, names: Sequence[str], json: Path | None
     for each in signals:
         units = ", ".join(dict.fromkeys(each.units))
         say(console, f"{each.name}: {len(each)} × {len(each.columns)} [{units}]")
+    for line in recording.left_out:
+        say(console, line)
     say(console, f"written {out}")
     if json is not None:
         columns = {each.name: list(each.columns) for each in signals}

@@ -117,12 +117,15 @@ def test_all_log_times_that_a_file_can_hold_are_streamed(tmp_path, writer):
         assert (bag.start_ns, bag.end_ns) == (LOGS[writer][0], LOGS[writer][-1])
 
 
-def test_a_later_log_time_is_refused(tmp_path):
-    path = write_mcap(tmp_path / "late.mcap", clock_messages([5, 2**63]))
-    with pytest.raises(
-        InputError, match=f"late.mcap: chunk at byte .*: log time {2**63} ns, allow"
-    ):
-        open_bag(path)
+@pytest.mark.parametrize("chunked", [True, False])
+def test_a_later_log_time_is_left_out_and_counted(tmp_path, chunked):
+    logs = [5, 2**63, 7, 2**64 - 1]
+    path = write_mcap(tmp_path / "late.mcap", clock_messages(logs), chunked=chunked)
+    with open_bag(path) as bag:
+        assert [message.log_ns for message in bag.messages()] == [5, 7]
+        assert bag.topics["/clock"].count == 2
+        assert (bag.start_ns, bag.end_ns) == (5, 7)
+        assert bag.faults == [f"{path}: 2 messages logged later than {2**63 - 1} ns left out"]
 
 
 def collect(bag, found):

@@ -31,7 +31,8 @@ def recover(
     bag: Annotated[
         Path,
         typer.Argument(
-            metavar="REC", help="A recording that was cut short: its folder or its MCAP file."
+            metavar="REC",
+            help="A recording that was cut short: its folder or its MCAP file; or a ROS 1 bag.",
         ),
     ],
     out: Annotated[

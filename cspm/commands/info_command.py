@@ -90,9 +90,7 @@ def _say_troubles(console: Console, bag: Path, found: Overview) -> None:
         say(console, f"refused: {count} messages on {topic}, which no node of the run obeyed")
     for fault in found.faults:
         say(console, f"fault: {fault}")
-    if found.faults and bag.suffix == ".bag":
-        say(console, "`cspm import` and `cspm replay` read it as far as it goes")
-    elif found.faults and found.complete:
+    if found.faults and found.complete:
         say(console, f"`cspm recover {bag}` restores what can be read")
     if not found.complete:
         say(console, f"cut short: `cspm recover {bag}` restores its index")

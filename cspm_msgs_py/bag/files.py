@@ -10,7 +10,7 @@ from pathlib import Path
 
 import zstandard
 
-from cspm_msgs_py.bag import ros1_runs, sqlite_runs
+from cspm_msgs_py.bag import sqlite_runs
 from cspm_msgs_py.bag.mcap_runs import McapRuns
 from cspm_msgs_py.bag.ros1_runs import Ros1Runs
 from cspm_msgs_py.bag.run import StoredFile, StoredMessage, StoredRun
@@ -20,6 +20,7 @@ from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.chunk import LARGEST_CHUNK
 from cspm_msgs_py.recording.mcap_file import BareFileError
 from cspm_msgs_py.recording.records import MAGIC as MCAP_MAGIC
+from cspm_msgs_py.recording.records import ROS1_MAGIC
 from cspm_msgs_py.recording.rosbag2_metadata import read_bag
 
 ALLOWED = "a rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag"
@@ -28,7 +29,7 @@ _COMPRESSIONS = ("none", "file", "message")
 _READERS: dict[bytes, Callable[[Path], StoredFile]] = {
     MCAP_MAGIC: McapRuns,
     sqlite_runs.MAGIC: SqliteRuns,
-    ros1_runs.MAGIC: Ros1Runs,
+    ROS1_MAGIC: Ros1Runs,
 }
 
 

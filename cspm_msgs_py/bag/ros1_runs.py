@@ -13,7 +13,7 @@ import bz2
 import struct
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from operator import itemgetter
 from pathlib import Path
@@ -25,19 +25,27 @@ from cspm_msgs_py.bag.run import StoredChannel, StoredMessage, StoredRun
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.message import NANOSECONDS
 from cspm_msgs_py.recording.chunk import LARGEST_CHUNK
+from cspm_msgs_py.recording.records import ROS1_MAGIC as MAGIC
 from cspm_msgs_py.recording.records import read_at
 from cspm_msgs_py.ros_types import ROS1_SCHEMA_ENCODING
 
-MAGIC = b"#ROSBAG V"
 ENCODING = "ros1"
-_VERSION = b"2.0\n"
-_MESSAGE, _BAG, _CHUNK, _CHUNK_INFO, _CONNECTION = (bytes([op]) for op in (2, 3, 5, 6, 7))
+VERSION = b"2.0\n"
+MESSAGE, BAG, INDEX, CHUNK, CHUNK_INFO, CONNECTION = (bytes([op]) for op in range(2, 8))
 _LARGEST_HEADER = 1 << 20
 _UINT32 = struct.Struct("<I")
 _UINT64 = struct.Struct("<Q")
 _TWO = struct.Struct("<II")
 
 _Fields = dict[bytes, bytes]
+
+
+class _Chunk(NamedTuple):
+    """A chunk: its compression, its data as they stand in the file, and what they unpack to."""
+
+    compression: bytes
+    data: bytes
+    content: bytes
 
 
 class _Record(NamedTuple):
@@ -52,7 +60,7 @@ class _Record(NamedTuple):
         return self.data + self.length
 
 
-class _ChunkInfo(NamedTuple):
+class ChunkInfo(NamedTuple):
     """What the index says about a chunk: its place, log times [ns], and messages by channel."""
 
     place: int
@@ -62,26 +70,34 @@ class _ChunkInfo(NamedTuple):
 
 
 class Ros1Runs:
-    """A ROS 1 bag of format 2.0; see `StoredFile`."""
+    """A ROS 1 bag of format 2.0; see `StoredFile`.
 
-    def __init__(self, path: Path) -> None:
-        """Open the bag and read its index.
+    Attributes:
+        chunks: what the index says about each chunk, or what was found without one.
+        connections: fields of each connection by its number.
+        lost_bytes: what follows the last whole chunk of a bag without index [bytes].
+    """
+
+    def __init__(self, path: Path, *, indexed: bool = True) -> None:
+        """Open the bag and read its index, or with `indexed` False all of it.
 
         Raises:
             InputError: it is not such a bag, or is damaged.
         """
         self.path = path
         self.faults: list[str] = []
+        self.lost_bytes = 0
+        self.connections: dict[int, _Fields] = {}
         self._file = path.open("rb")
         try:
             with self._damage("index"):
-                infos = self._read_index()
+                self.chunks = self._read_index(indexed=indexed)
         except BaseException:
             self._file.close()
             raise
         self.runs = [
             StoredRun(info.first_ns, info.last_ns, partial(self._read, info))
-            for info in sorted(infos, key=itemgetter(0))
+            for info in sorted(self.chunks, key=itemgetter(0))
             if sum(info.counts.values())
         ]
 
@@ -93,46 +109,53 @@ class Ros1Runs:
         except (struct.error, KeyError, ValueError) as err:
             raise InputError(f"{self.path}: damaged {what} ({_reason(err)})") from None
 
-    def _read_index(self) -> list[_ChunkInfo]:
+    def _read_index(self, *, indexed: bool) -> list[ChunkInfo]:
         """Return the chunks; set `channels`."""
-        if self._bytes(len(MAGIC), len(_VERSION)) != _VERSION:
+        if self._bytes(len(MAGIC), len(VERSION)) != VERSION:
             raise InputError(f"{self.path}: a ROS 1 bag of another format, allowed: V2.0")
-        first = self._record(len(MAGIC) + len(_VERSION), _BAG)
+        first = self._record(len(MAGIC) + len(VERSION), BAG)
         head = first.fields
         if head.get(b"encryptor"):
             raise InputError(f"{self.path}: an encrypted bag, allowed: one that is not")
         (end,) = _UINT64.unpack(head[b"index_pos"])
-        if end == 0:
-            return self._scan(first)
-        connections, infos = [], []
+        if end == 0 or not indexed:
+            return self._scan(first.end, "was not closed" if indexed else "has a damaged index")
+        try:
+            return self._indexed(head, end)
+        except InputError:
+            return self._scan(first.end, "ends inside its index")
+
+    def _indexed(self, head: _Fields, end: int) -> list[ChunkInfo]:
+        infos = []
         for _ in range(_uint32(head[b"conn_count"])):
-            connections.append(self._record(end, _CONNECTION))
-            end = connections[-1].end
+            record = self._record(end, CONNECTION)
+            about = _fields(self._bytes(record.data, record.length))
+            self.connections[_uint32(record.fields[b"conn"])] = record.fields | about
+            end = record.end
         for _ in range(_uint32(head[b"chunk_count"])):
-            record = self._record(end, _CHUNK_INFO)
+            record = self._record(end, CHUNK_INFO)
             infos.append(_chunk_info(record.fields, self._bytes(record.data, record.length)))
             end = record.end
         counts: Counter[int] = Counter()
         for info in infos:
             counts.update(info.counts)
-        self.channels = [self._channel(record, counts) for record in connections]
-        unknown = counts.keys() - {channel.id for channel in self.channels}
+        self.channels = [_described(*each, counts) for each in self.connections.items()]
+        unknown = counts.keys() - self.connections.keys()
         if unknown:
             raise ValueError(f"messages on connection {min(unknown)}, which no record describes")
         return infos
 
-    def _scan(self, head: _Record) -> list[_ChunkInfo]:
-        """Return the whole chunks of a bag that was not closed; set `channels`."""
-        size, place = self.path.stat().st_size, head.end
-        infos: list[_ChunkInfo] = []
-        described: dict[int, _Fields] = {}
+    def _scan(self, place: int, why: str) -> list[ChunkInfo]:
+        """Return the whole chunks of a bag without index, from a place on; set `channels`."""
+        size = self.path.stat().st_size
+        infos: list[ChunkInfo] = []
         counts: Counter[int] = Counter()
         while place < size:
             try:
                 record = self._any_record(place)
-                if record.fields[b"op"] == _CHUNK:
-                    content = self._content(place)
-                    times = [(log, channel) for log, channel, _ in _messages(content)]
+                if record.fields[b"op"] == CHUNK:
+                    content = self.chunk(place).content
+                    times = [(log, channel) for log, channel, _ in messages(content)]
                     found = dict(_connections(content))
                 elif record.end > size:
                     break
@@ -141,21 +164,22 @@ class Ros1Runs:
                     continue
             except (struct.error, KeyError, ValueError, InputError):
                 break
-            described |= found
+            self.connections |= found
             here = Counter(channel for _, channel in times)
-            if times and here.keys() <= described.keys():
-                infos.append(_ChunkInfo(place, min(times)[0], max(times)[0], dict(here)))
+            if times and here.keys() <= self.connections.keys():
+                infos.append(ChunkInfo(place, min(times)[0], max(times)[0], dict(here)))
                 counts += here
-            place = record.end
+            place = record.end if record.length else record.data + len(content)
         if not infos:
             raise InputError(
-                f"{self.path}: a ROS 1 bag that was not closed, and holds no whole chunk, allowed:"
-                " at least one"
+                f"{self.path}: a ROS 1 bag that {why}, and holds no whole chunk, allowed: at least"
+                " one"
             )
-        self.channels = [_described(id_, about, counts) for id_, about in described.items()]
+        self.lost_bytes = size - place
+        self.channels = [_described(*each, counts) for each in self.connections.items()]
         self.faults.append(
-            f"{self.path}: a ROS 1 bag that was not closed: {len(infos)} whole chunks with"
-            f" {counts.total()} messages are read, {size - place} bytes after them left out"
+            f"{self.path}: a ROS 1 bag that {why}: {len(infos)} whole chunks with"
+            f" {counts.total()} messages are read, {self.lost_bytes} bytes after them left out"
         )
         return infos
 
@@ -180,37 +204,51 @@ class Ros1Runs:
         header = self._bytes(offset + 4, length + 4)
         return _Record(_fields(header[:-4]), offset + 8 + length, _uint32(header[-4:]))
 
-    def _channel(self, record: _Record, counts: Counter[int]) -> StoredChannel:
-        about = _fields(self._bytes(record.data, record.length))
-        return _described(_uint32(record.fields[b"conn"]), record.fields | about, counts)
-
     def _read(
-        self, info: _ChunkInfo, channels: Collection[int], start_ns: int
+        self, info: ChunkInfo, channels: Collection[int], start_ns: int
     ) -> Iterator[StoredMessage]:
         if info.counts.keys().isdisjoint(channels):
             return
+        wanted = frozenset(channels)
+        found = sorted(self.messages_of(info), key=itemgetter(0))
+        yield from (m for m in found if m[0] >= start_ns and m[1] in wanted)
+
+    def messages_of(self, info: ChunkInfo) -> list[StoredMessage]:
+        """Return a chunk's messages as they stand in it.
+
+        Raises:
+            InputError: it is damaged, or holds others than `info` says.
+        """
         with self._damage(f"chunk at byte {info.place}"):
-            messages = list(_messages(self._content(info.place)))
-        times = [log for log, _, _ in messages]
-        if len(times) != sum(info.counts.values()) or not (
-            info.first_ns <= min(times) <= max(times) <= info.last_ns
+            found = list(messages(self.chunk(info.place).content))
+        times = [log for log, _, _ in found]
+        if len(times) != sum(info.counts.values()) or (
+            times and not info.first_ns <= min(times) <= max(times) <= info.last_ns
         ):
             raise InputError(
                 f"{self.path}: chunk at byte {info.place}: other messages than its index says"
             )
-        wanted = frozenset(channels)
-        messages.sort(key=itemgetter(0))
-        yield from (
-            message for message in messages if message[0] >= start_ns and message[1] in wanted
-        )
+        return found
 
-    def _content(self, place: int) -> bytes:
-        record = self._record(place, _CHUNK)
-        size, compression = _uint32(record.fields[b"size"]), record.fields[b"compression"].decode()
+    def chunk(self, place: int) -> _Chunk:
+        """Return the chunk at an offset of the file.
+
+        Raises:
+            ValueError, struct.error, KeyError: it is damaged.
+            InputError: the file ends before.
+        """
+        record = self._record(place, CHUNK)
+        packed = record.fields[b"compression"]
+        size, compression = _uint32(record.fields[b"size"]), packed.decode()
         if compression not in _DECOMPRESS:
             raise ValueError(f"compression {compression!r}, allowed: {', '.join(_DECOMPRESS)}")
         if size > LARGEST_CHUNK:
             raise ValueError(f"{size} bytes, allowed: up to {LARGEST_CHUNK}")
+        if not record.length and compression == "none":
+            # A writer fills in the lengths when it ends the chunk: this one it never ended.
+            rest = min(self.path.stat().st_size - record.data, LARGEST_CHUNK)
+            content = _whole_part(self._bytes(record.data, rest))
+            return _Chunk(packed, content, content)
         data = self._bytes(record.data, record.length)
         try:
             content = _DECOMPRESS[compression](data, size)
@@ -218,7 +256,7 @@ class Ros1Runs:
             raise ValueError(f"no {compression} data: {_reason(err)}") from None
         if len(content) != size:
             raise ValueError(f"{len(content)} bytes where {size} are announced")
-        return content
+        return _Chunk(packed, data, content)
 
     def close(self) -> None:
         """Close the file."""
@@ -277,10 +315,10 @@ def _fields(header: bytes) -> _Fields:
     return fields
 
 
-def _chunk_info(fields: _Fields, data: bytes) -> _ChunkInfo:
+def _chunk_info(fields: _Fields, data: bytes) -> ChunkInfo:
     (place,) = _UINT64.unpack(fields[b"chunk_pos"])
     first, last = _time_ns(fields[b"start_time"]), _time_ns(fields[b"end_time"])
-    return _ChunkInfo(place, first, last, dict(_TWO.iter_unpack(data)))
+    return ChunkInfo(place, first, last, dict(_TWO.iter_unpack(data)))
 
 
 def _described(id_: int, about: _Fields, counts: Counter[int]) -> StoredChannel:
@@ -295,23 +333,34 @@ def _described(id_: int, about: _Fields, counts: Counter[int]) -> StoredChannel:
     )
 
 
-def _messages(content: bytes) -> Iterator[StoredMessage]:
+def messages(content: bytes) -> Iterator[StoredMessage]:
     """Yield the messages of a chunk's content as they stand in it."""
-    for fields, data in _records(content):
-        if fields[b"op"] == _MESSAGE:
+    for fields, data, _ in records(content):
+        if fields[b"op"] == MESSAGE:
             yield _time_ns(fields[b"time"]), _uint32(fields[b"conn"]), data
 
 
 def _connections(content: bytes) -> Iterator[tuple[int, _Fields]]:
     """Yield number and description of the connections in a chunk's content."""
-    for fields, data in _records(content):
-        if fields[b"op"] == _CONNECTION:
+    for fields, data, _ in records(content):
+        if fields[b"op"] == CONNECTION:
             # The topic that the header names is the one that counts.
-            yield _uint32(fields[b"conn"]), {**_fields(data), b"topic": fields[b"topic"]}
+            yield _uint32(fields[b"conn"]), {**fields, **_fields(data), b"topic": fields[b"topic"]}
 
 
-def _records(content: bytes) -> Iterator[tuple[_Fields, bytes]]:
-    """Yield header and data of a chunk's records.
+def _whole_part(content: bytes) -> bytes:
+    """Return the messages and connections with which a chunk's content begins."""
+    whole = 0
+    with suppress(struct.error, KeyError, ValueError):
+        for fields, _, end in records(content):
+            if fields[b"op"] not in (MESSAGE, CONNECTION):
+                break
+            whole = end
+    return content[:whole]
+
+
+def records(content: bytes) -> Iterator[tuple[_Fields, bytes, int]]:
+    """Yield header and data of a chunk's records, and where each ends.
 
     Raises:
         ValueError, struct.error, KeyError: it is not a sequence of records.
@@ -324,5 +373,5 @@ def _records(content: bytes) -> Iterator[tuple[_Fields, bytes]]:
         end = data + size
         if end > len(content):
             raise ValueError(f"a record of it ends {end - len(content)} bytes behind its end")
-        yield _fields(content[offset + 4 : data - 4]), content[data:end]
+        yield _fields(content[offset + 4 : data - 4]), content[data:end], end
         offset = end

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.reader import Recording
+from cspm_msgs_py.recording.records import ROS1_MAGIC, starts_with
 from cspm_msgs_py.recording.rosbag2_metadata import FILE_NAME, read_bag
 from cspm_msgs_py.yaml_file import parse_yaml
 
@@ -19,7 +20,7 @@ Times = NDArray[np.int64]
 # Times are outside of what is compressed.
 _COMPRESSIONS = ("none", "message")
 _ALL_COMPRESSIONS = (*_COMPRESSIONS, "file")
-_SQLITE, _ROS1 = b"SQLite format 3\x00", b"#ROSBAG V"
+_SQLITE = b"SQLite format 3\x00"
 _EARLIEST_NS = -(2**63)
 
 
@@ -109,20 +110,12 @@ def overview(path: Path) -> Overview:
         faults += bag.faults
         if bag.storage == "sqlite3" or bag.compression == "file":
             return _bag_overview(path)
-    if path.is_file() and _starts_with(path, _SQLITE, _ROS1):
+    if path.is_file() and starts_with(path, _SQLITE, ROS1_MAGIC):
         return _bag_overview(path)
     with Recording(path, compressions=_COMPRESSIONS) as recording:
         faults += [f"{file}: not closed, and holds no message" for file in recording.bare]
         damaged = [fault for file in recording.files for fault in file.drop_damaged()]
         return _mcap_overview(recording, faults, damaged)
-
-
-def _starts_with(path: Path, *magics: bytes) -> bool:
-    try:
-        with path.open("rb") as file:
-            return file.read(max(map(len, magics))).startswith(magics)
-    except OSError as err:
-        raise InputError(f"{path}: {err.strerror}") from None
 
 
 class _Gaps:
@@ -281,4 +274,4 @@ def _bag_result(path: Path, topics: list[TopicOverview], faults: list[str]) -> O
 def _storage_of(path: Path) -> str:
     if path.is_dir():
         return read_bag(path, compressions=_ALL_COMPRESSIONS).storage
-    return "rosbag1" if _starts_with(path, _ROS1) else "sqlite3"
+    return "rosbag1" if starts_with(path, ROS1_MAGIC) else "sqlite3"

@@ -22,6 +22,7 @@ from mcap.records import Attachment, McapRecord, Schema
 from cspm_msgs_py.errors import InputError
 
 MAGIC = b"\x89MCAP0\r\n"
+ROS1_MAGIC = b"#ROSBAG V"
 HEAD = struct.Struct("<BQ")
 
 MESSAGE_PREFIX = np.dtype(
@@ -96,6 +97,19 @@ def parse_attachment(content: bytes, where: str) -> Attachment:
     if crc and crc != zlib.crc32(content[:-4]):
         raise InputError(f"{where}: attachment {attachment.name!r} is damaged (CRC)")
     return attachment
+
+
+def starts_with(path: Path, *magics: bytes) -> bool:
+    """Return whether a file begins with one of some byte strings.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return file.read(max(map(len, magics))).startswith(magics)
+    except OSError as err:
+        raise InputError(f"{path}: {err.strerror}") from None
 
 
 def read_at(file: IO[bytes], offset: int, length: int, path: Path) -> bytes:

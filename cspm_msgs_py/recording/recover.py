@@ -27,7 +27,7 @@ from cspm_msgs_py.recording.chunk import (
 from cspm_msgs_py.recording.log_time import in_time, left_out, rewritten
 from cspm_msgs_py.recording.mcap_file import BareFileError, McapFile
 from cspm_msgs_py.recording.reader import message_counts, message_type
-from cspm_msgs_py.recording.records import HEAD, Opcode, parse, spans_in
+from cspm_msgs_py.recording.records import HEAD, ROS1_MAGIC, Opcode, parse, spans_in, starts_with
 from cspm_msgs_py.recording.rosbag2_metadata import (
     FILE_NAME,
     FileEntry,
@@ -93,7 +93,7 @@ def recover(path: Path, out: Path | None = None) -> RecoveryReport:
     one of the two has its name.
 
     Args:
-        path: a rosbag2 folder, with or without `metadata.yaml`, or an MCAP file.
+        path: a rosbag2 folder, with or without `metadata.yaml`, an MCAP file, or a ROS 1 `.bag`.
         out: a new folder for the restored recording; absent: in place.
 
     Raises:
@@ -101,6 +101,11 @@ def recover(path: Path, out: Path | None = None) -> RecoveryReport:
         CspmError: the restored file cannot be written.
     """
     path = Path(path)
+    if path.is_file() and starts_with(path, ROS1_MAGIC):
+        # It reads recordings as well.
+        from cspm_msgs_py.bag.ros1_restore import recover_ros1
+
+        return recover_ros1(path, None if out is None else Path(out))
     found, packed = _files(path)
     bare = [file for file in found if _is_bare(file)] if len(found) > 1 else []
     files = [file for file in found if file not in bare] or found
@@ -116,11 +121,6 @@ def _files(path: Path) -> tuple[list[Path], bool]:
     """Return the files of a recording, and whether their messages are compressed one by one."""
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
-    if path.suffix == ".bag":
-        raise InputError(
-            f"{path}: a ROS 1 bag, allowed: MCAP; `cspm import` and `cspm replay` read a ROS 1 bag"
-            " as far as it goes"
-        )
     if not path.is_dir():
         return [path], False
     if (path / FILE_NAME).exists():
@@ -155,7 +155,7 @@ def _restore_in_place(
         if broken.exists():
             raise InputError(f"{broken}: already exists, allowed: move it away first")
         results.append(_restore(file, beside))
-        _exchange(file, beside, broken)
+        exchange(file, beside, broken)
         restored.append(file)
         kept.append(broken)
     folder = path if path.is_dir() else path.parent
@@ -200,7 +200,7 @@ def _report(
     return RecoveryReport(path, restored, kept, *found, damaged, lost, bare, described, late)
 
 
-def _exchange(file: Path, beside: Path, broken: Path) -> None:
+def exchange(file: Path, beside: Path, broken: Path) -> None:
     """Give `beside` the name of `file`, and that the name `broken`."""
     try:
         os.link(file, broken)

@@ -169,7 +169,8 @@ class Ros1Runs:
             if times and here.keys() <= self.connections.keys():
                 infos.append(ChunkInfo(place, min(times)[0], max(times)[0], dict(here)))
                 counts += here
-            place = record.end if record.length else record.data + len(content)
+            is_open = not record.length or record.end > size
+            place = record.data + len(content) if is_open else record.end
         if not infos:
             raise InputError(
                 f"{self.path}: a ROS 1 bag that {why}, and holds no whole chunk, allowed: at least"
@@ -178,7 +179,7 @@ class Ros1Runs:
         self.lost_bytes = size - place
         self.channels = [_described(*each, counts) for each in self.connections.items()]
         self.faults.append(
-            f"{self.path}: a ROS 1 bag that {why}: {len(infos)} whole chunks with"
+            f"{self.path}: a ROS 1 bag that {why}: {len(infos)} chunks with"
             f" {counts.total()} messages are read, {self.lost_bytes} bytes after them left out"
         )
         return infos
@@ -244,9 +245,10 @@ class Ros1Runs:
             raise ValueError(f"compression {compression!r}, allowed: {', '.join(_DECOMPRESS)}")
         if size > LARGEST_CHUNK:
             raise ValueError(f"{size} bytes, allowed: up to {LARGEST_CHUNK}")
-        if not record.length and compression == "none":
-            # A writer fills in the lengths when it ends the chunk: this one it never ended.
-            rest = min(self.path.stat().st_size - record.data, LARGEST_CHUNK)
+        rest = min(self.path.stat().st_size - record.data, LARGEST_CHUNK)
+        if compression == "none" and (not record.length or record.length > rest):
+            # A writer fills in the lengths when it ends the chunk: this one it never ended, or the
+            # file is cut in it.
             content = _whole_part(self._bytes(record.data, rest))
             return _Chunk(packed, content, content)
         data = self._bytes(record.data, record.length)

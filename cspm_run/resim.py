@@ -7,8 +7,12 @@ from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cspm_msgs_py.diagnostics import hardware_id_of
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.message import NANOSECONDS
 from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.difference import Difference, first_difference
 from cspm_msgs_py.recording.reader import Recording
@@ -21,7 +25,7 @@ from cspm_msgs_py.recording.run_record import (
 )
 from cspm_msgs_py.topics import DIAGNOSTICS, SCENE
 from cspm_run.bundle import read_bundle, with_own_code
-from cspm_run.recorded_run import run
+from cspm_run.recorded_run import run, steps_of
 
 
 @dataclass(frozen=True)
@@ -33,12 +37,14 @@ class Resimulation:
         messages: how many messages the recording holds.
         cut_ns: the instant inside which the recording ends [ns], None if its last is whole.
         recorded_version: version of the package that made the recording.
+        missing_s: first and last time [s] of each part of the scenario that is not recorded.
     """
 
     difference: Difference | None
     messages: int
     cut_ns: int | None
     recorded_version: str
+    missing_s: tuple[tuple[float, float], ...] = ()
 
     @property
     def same_version(self) -> bool:
@@ -88,7 +94,7 @@ def _repeat(
     duration = clock.count / bundle.scenario.rates.plant
     with ScratchFolder("resim") as place:
         folder = place / "again"
-        run(
+        result = run(
             bundle,
             folder,
             lambda now: progress(now, duration),
@@ -102,6 +108,28 @@ def _repeat(
         messages=sum(topic.count for topic in recording.topics.values()),
         cut_ns=recording.end_ns if cut else None,
         recorded_version=record.get("package_version", "unknown"),
+        missing_s=_missing(
+            recording.rows("/clock").stamp_ns / NANOSECONDS * bundle.scenario.rates.plant,
+            steps_of(bundle) if result.failure is None else clock.count,
+            bundle.scenario.rates.plant,
+        ),
+    )
+
+
+def _missing(
+    instants: NDArray[np.float64], steps: int, rate: float
+) -> tuple[tuple[float, float], ...]:
+    """Return first and last time [s] of each part of a run of so many steps that is not there.
+
+    Args:
+        instants: recorded ones, in steps of the plant.
+        steps: how many the run has.
+        rate: steps per second [Hz].
+    """
+    edges = np.unique(np.r_[-1.0, np.round(instants), steps])
+    gaps = np.flatnonzero(np.diff(edges) > 1.0)
+    return tuple(
+        (float(edges[i] + 1.0) / rate, float(edges[i + 1] - 1.0) / rate) for i in gaps.tolist()
     )
 
 

@@ -38,6 +38,9 @@ from cspm_run.stage_warm_up import compile_beside
 if TYPE_CHECKING:
     from cspm_ros.margins.rehearsal import Variant
 
+# So many parts of a run that are missing are told.
+_MOST_GAPS = 3
+
 
 def run_command(
     path: Path,
@@ -237,11 +240,18 @@ def resim_command(bag: Path, json: Path | None, controllers: Sequence[Path] = ()
         say(console, f"different: {found.difference}")
         if not found.same_version:
             say(console, f"the recording was made by version {found.recorded_version}")
+    for first, last in found.missing_s[:_MOST_GAPS]:
+        say(console, f"not recorded, or not run: {first:g} to {last:g} s of the scenario")
+    if len(found.missing_s) > _MOST_GAPS:
+        say(console, f"and {len(found.missing_s) - _MOST_GAPS} more parts")
     if json is not None:
         difference = dataclasses.asdict(found.difference) if found.difference else None
         identical = {"identical": difference is None, "first_difference": difference}
         cut = None if found.cut_ns is None else found.cut_ns * 1e-9
-        write_json(json, identical | {"messages": found.messages, "cut_at_s": cut})
+        write_json(
+            json,
+            identical | {"messages": found.messages, "cut_at_s": cut, "missing_s": found.missing_s},
+        )
     return found.difference is None
 
 

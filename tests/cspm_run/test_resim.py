@@ -16,6 +16,7 @@ from run_samples import bundle_of
 from cspm_msgs_py.diagnostics import hardware_id_of
 from cspm_msgs_py.edited import with_effect
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.message import carries_row
 from cspm_msgs_py.recording import Recording, recover
 from cspm_msgs_py.recording.attached_testbed import attached_testbed
 from cspm_msgs_py.recording.mcap_file import McapFile
@@ -67,7 +68,8 @@ def test_every_kind_of_run_repeats_itself(tmp_path, scenario):
 
 def test_a_diverged_run_repeats_itself(tmp_path):
     assert run(bundle_of("rest", *WILD), tmp_path / "bag").failure is not None
-    assert again(tmp_path / "bag").difference is None
+    found = again(tmp_path / "bag")
+    assert (found.difference, found.missing_s) == (None, ())
 
 
 def test_a_copy_is_still_identical(folder, tmp_path):
@@ -107,6 +109,34 @@ def test_a_message_missing_among_others_is_no_cut(folder, tmp_path, index):
     assert found.cut_ns is None
     assert found.difference is not None
     assert (found.difference.topic, found.difference.index) == ("/bar/pose", index)
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    place = tmp_path_factory.mktemp("resim") / "short"
+    run(bundle_of("worst_case", "duration=0.4", "rates.motion_controller=100"), place)
+    return place
+
+
+@pytest.mark.parametrize(
+    ("kept", "missing"),
+    [
+        (range(400), ()),
+        (range(200), ((0.2, 0.399),)),
+        (range(200, 400), ((0.0, 0.199),)),
+        ([*range(100), *range(300, 400)], ((0.1, 0.299),)),
+    ],
+)
+def test_parts_of_a_run_that_are_missing_are_named(short, tmp_path, kept, missing):
+    times = {i * 1_000_000 for i in kept}
+    with Recording(short) as recording:
+        names = [n for n, info in recording.topics.items() if carries_row(info.ros_type)]
+        stamps = {name: rows.log_ns for name, rows in recording.rows_of(names).items()}
+
+    def drop(name, i, row):
+        return row if stamps[name][i] in times else None
+
+    assert again(rewrite(short, tmp_path / "part", drop)).missing_s == missing
 
 
 def test_another_seed_in_the_attachment_is_a_difference(folder, tmp_path):

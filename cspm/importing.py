@@ -15,10 +15,10 @@ from cspm_ident.importing.preparation import Prepared, prepare
 from cspm_ident.importing.write import write_messages
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_msgs_py.recording.attached_testbed import TESTBED
+from cspm_msgs_py.recording.run_record import CONTRACT_VERSION
 from cspm_msgs_py.testbed import TestbedFile
 from cspm_msgs_py.yaml_file import dump_yaml
 from cspm_run.library import find_mapping
-from cspm_run.recorded_run import CONTRACT_VERSION
 
 MAPPING, REPORT = "mapping.yaml", "import.yaml"
 MODE = "import"

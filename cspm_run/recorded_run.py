@@ -10,7 +10,7 @@ from typing import Protocol
 from cspm_msgs_py.diagnostics import Level, Status, encode_diagnostics
 from cspm_msgs_py.errors import ControllerError, DivergenceError
 from cspm_msgs_py.interruption import interruptible
-from cspm_msgs_py.recording.run_record import OWN_CONTROLLERS, OWN_NODE
+from cspm_msgs_py.recording.run_record import CONTRACT_VERSION, OWN_CONTROLLERS, OWN_NODE
 from cspm_msgs_py.recording.writer import RecordingWriter
 from cspm_msgs_py.schedule import schedule_of
 from cspm_msgs_py.topics import DIAGNOSTICS, Topic
@@ -26,7 +26,6 @@ from cspm_run.stability.run_warnings import limits_met, run_warnings
 from cspm_run.stepping import Stepping
 from cspm_sim.simulator import Publish
 
-CONTRACT_VERSION = "1"
 INPROCESS = "inprocess"
 
 

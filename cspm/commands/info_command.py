@@ -88,6 +88,8 @@ def _numbers(topic: TopicOverview, start_ns: int) -> tuple[str, str, str, str]:
 def _say_troubles(console: Console, bag: Path, found: Overview) -> None:
     for topic, count in found.refused.items():
         say(console, f"refused: {count} messages on {topic}, which no node of the run obeyed")
+    for line in found.misfits:
+        say(console, f"does not fit: {line}")
     for fault in found.faults:
         say(console, f"fault: {fault}")
     if found.faults and found.complete:

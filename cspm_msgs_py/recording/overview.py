@@ -14,6 +14,7 @@ from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.reader import Recording
 from cspm_msgs_py.recording.records import ROS1_MAGIC, starts_with
 from cspm_msgs_py.recording.rosbag2_metadata import FILE_NAME, read_bag
+from cspm_msgs_py.recording.run_record import RECORD_NAME, misfits
 from cspm_msgs_py.yaml_file import parse_yaml
 
 Times = NDArray[np.int64]
@@ -66,6 +67,7 @@ class Overview:
         end_ns: latest log time [ns], 0 without messages.
         message_count: number of messages.
         topics: in the order of the recording.
+        misfits: attachments and versions that do not fit the record, one line each.
         refused: number of messages that nobody of the run obeyed, by topic, `/refused/…`.
         attachments: length of each attached file [bytes] by name.
         metadata: metadata records by name.
@@ -89,6 +91,7 @@ class Overview:
     metadata: dict[str, dict[str, str]]
     scenario: str | None
     testbed: str | None
+    misfits: list[str] = field(default_factory=list)
     refused: dict[str, int] = field(default_factory=dict)
 
     @property
@@ -200,6 +203,7 @@ def _mcap_overview(recording: Recording, faults: list[str], damaged: list[str]) 
         metadata=recording.metadata,
         scenario=_own_name(recording, "scenario.yaml"),
         testbed=_own_name(recording, "testbed.yaml"),
+        misfits=misfits(recording.attachments, recording.metadata.get(RECORD_NAME, {})),
         refused=recording.refused,
     )
 

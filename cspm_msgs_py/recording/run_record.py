@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from hashlib import sha256
+
 from cspm_msgs_py.recording.reader import Recording
 
 RECORD_NAME = "cspm"
+CONTRACT_VERSION = "1"
+# Attachments whose SHA-256 the record has, with its key.
+_SEALED = {"testbed.yaml": "testbed_sha256", "mapping.yaml": "mapping_sha256"}
 # In the plant's place: somebody's drivers, not a simulation.
 SIM, MUJOCO, EXTERNAL = "sim", "mujoco", "external"
 # The key under which controllers of somebody's own are named: objects, which no recording carries,
@@ -23,3 +29,27 @@ def simulated_plant(recording: Recording) -> str | None:
     """Return which of this project's plants was recorded; None of hardware and imported data."""
     plant = recording.metadata.get(RECORD_NAME, {}).get("plant")
     return None if plant == EXTERNAL else plant
+
+
+def misfits(attachments: Mapping[str, bytes], record: Mapping[str, str]) -> list[str]:
+    """Return what of a recording does not fit its record, one line each.
+
+    Args:
+        attachments: content by name.
+        record: the metadata of the run or import.
+    """
+    found = []
+    for name, key in _SEALED.items():
+        if name in attachments and key in record:
+            digest = sha256(attachments[name]).hexdigest()
+            if digest != record[key]:
+                found.append(
+                    f"{name} has SHA-256 {digest}, but {key} is {record[key]}: exchanged or edited"
+                )
+    version = record.get("contract_version", CONTRACT_VERSION)
+    if version != CONTRACT_VERSION:
+        found.append(
+            f"contract version {version}, this cspm has {CONTRACT_VERSION}: names and units may"
+            " mean something else"
+        )
+    return found

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cspm_msgs_py.bag.conversion import HEADER, Convert, from_cdr, from_ros1
 from cspm_msgs_py.bag.ros1_runs import ENCODING as ROS1_ENCODING
@@ -32,7 +33,10 @@ def own_type(channel: StoredChannel, ros_type: str) -> OwnType:
         InputError: there is no definition, or it cannot be read.
     """
     if not channel.definition:
-        raise InputError(f"{ros_type} is unknown and recorded without its definition")
+        raise InputError(
+            f"{ros_type} is unknown and recorded without its definition, allowed: recorded where"
+            " its package is built and sourced"
+        )
     if channel.encoding not in (MESSAGE_ENCODING, ROS1_ENCODING):
         raise InputError(
             f"messages are encoded as {channel.encoding!r}, allowed: {MESSAGE_ENCODING},"
@@ -54,6 +58,11 @@ def _store(channel: StoredChannel, ros_type: str) -> Typestore:
         found.pop(HEADER, None)
     # Some writers leave out what they think everybody has.
     missing = {name: known[name] for name in known if name not in found}
+    if undefined := _named_in(found) - found.keys() - missing.keys():
+        raise InputError(
+            f"schema of {ros_type} lacks the definition of {', '.join(sorted(undefined))}, allowed:"
+            " those of all types in it"
+        )
     try:
         store.register({**missing, **found})
     except Exception as err:
@@ -61,3 +70,14 @@ def _store(channel: StoredChannel, ros_type: str) -> Typestore:
             f"schema of {ros_type} cannot be used ({' '.join(str(err).split())})"
         ) from None
     return store
+
+
+def _named_in(definitions: Mapping[str, Any]) -> set[str]:
+    """Return the types of which fields are, alone or in arrays and sequences."""
+    from rosbags.interfaces import Nodetype
+
+    kinds = [kind for _, fields in definitions.values() for _, kind in fields]
+    inner = [
+        kind[1][0] if kind[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE) else kind for kind in kinds
+    ]
+    return {kind[1] for kind in inner if kind[0] == Nodetype.NAME}

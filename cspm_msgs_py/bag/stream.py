@@ -236,7 +236,8 @@ def _route(channel: StoredChannel, own: _OwnTypes | None) -> _Route:
     try:
         return _Route(channel.topic, converter(channel))
     except InputError:
-        if own is None or not channel.definition:
+        known = ros2_type(channel) in typestore().fielddefs
+        if own is None or (known and not channel.definition):
             raise
         return own.route(channel)
 

@@ -12,7 +12,6 @@ environment chooses the graph, by `ROS_DOMAIN_ID`. It reaches no further than th
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -25,10 +24,9 @@ from cspm.replaying import ReplayRequest, opened, played
 from cspm.scenario import AnyScenario
 from cspm.summary_files import finish_recording
 from cspm.testbed import AnyTestbed
-from cspm_msgs_py.graph import RECORDER
 from cspm_ros.replay.bag_selection import Selection
 from cspm_ros.replay.player import Player
-from cspm_ros.runtime.node_main import main, start_node
+from cspm_ros.runtime.node_main import start_node
 
 __all__ = ["DriverReport", "Replay", "check_drivers", "replay", "run_node"]
 
@@ -101,21 +99,6 @@ def run_node(name: str, args: Sequence[str] = ()) -> None:
     """
     if (recorded := start_node(name, args)) is not None:
         finish_recording(recorded)
-
-
-def run_program(name: str, args: Sequence[str]) -> int:
-    """Run a node as a program, errors as one line on stderr; return its exit code.
-
-    Args:
-        name: as for `run_node`.
-        args: as for `run_node`.
-    """
-    return main(name, args, finish=finish_recording)
-
-
-def recorder() -> None:
-    """Run the recorder as a program, for `ros2 run`."""
-    sys.exit(run_program(RECORDER, sys.argv[1:]))
 
 
 def check_drivers(

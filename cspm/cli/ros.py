@@ -40,7 +40,7 @@ def node(context: typer.Context) -> None:
         typer.echo(context.get_help())
         raise typer.Exit(0)
     COMMAND.set(f"{context.command_path} {name}")
-    from cspm.graph import run_program
+    from cspm.cli.node_program import run_program
 
     raise typer.Exit(run_program(name, rest))
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cspm_msgs_py.errors import SingularityError
 from cspm_msgs_py.testbed import Cable, Testbed
@@ -245,6 +244,9 @@ def _twist(heard: Mapping[str, Heard], faulty: Collection[str], body: str) -> It
 
 def turned(quaternions: Array) -> Array:
     """Return the integral of ω in world axes (n, 3) [rad] over the attitudes x y z w (n, 4)."""
+    # Loading it takes half a second, which not all that imports this module uses.
+    from scipy.spatial.transform import Rotation
+
     attitudes = Rotation.from_quat(quaternions)
     steps = (attitudes[1:] * attitudes[:-1].inv()).as_rotvec()
     return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])

@@ -47,11 +47,21 @@ def newly_loaded(steps, folder):
     return json.loads(done.stdout)
 
 
-def test_package_and_command_line_load_next_to_nothing():
-    code = "import json, sys, cspm, cspm.cli.main; print(json.dumps([*sys.modules]))"
+def loaded_by(modules):
+    """Return the names of all modules that a process has which imports some."""
+    code = f"import json, sys, {modules}; print(json.dumps([*sys.modules]))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(json.loads(done.stdout))
+    return set(json.loads(done.stdout))
+
+
+def test_package_and_command_line_load_next_to_nothing():
+    loaded = loaded_by("cspm, cspm.cli.main")
     assert not loaded & {*FITS, *APART, "numpy", "numba", "scipy", "pydantic", "mcap", "rosbags"}
+
+
+def test_a_node_begins_without_what_only_replays_and_recordings_need():
+    loaded = loaded_by("cspm.cli.node_program")
+    assert not loaded & {*FITS, *APART, "numba", "scipy", "cspm_ros.replay.player"}
 
 
 def test_commands_that_fit_nothing_begin_without_fits_pages_and_extras(tmp_path):

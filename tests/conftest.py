@@ -18,7 +18,11 @@ from machines import THESIS, build, general_content, point_content, rig_content
 
 from cspm.cli import main as cli
 from cspm.commands import progress_shown
+from cspm_msgs_py.garbage import look_seldom
 from cspm_msgs_py.testbed import load_testbed
+
+# Collected tests and all that they load stay: workers collect with 2 s less of 15 s.
+look_seldom()
 
 # The first call of a kernel may compile it, which takes longer than any sensible deadline.
 hypothesis.settings.register_profile("cspm", deadline=None, derandomize=True)

@@ -16,6 +16,7 @@ from cspm.cli.app import RUN_FAILED, Json, app, new_folder
 from cspm.cli.shared_options import COMMAND, Browser, Port, add_shared_options
 from cspm_msgs_py.control_spec.motion_laws import MOTION_LAWS
 from cspm_msgs_py.errors import CspmError, InputError
+from cspm_msgs_py.garbage import look_seldom
 from cspm_msgs_py.new_folder import refuse_existing
 from cspm_run.library import find_scenario, find_testbed, scenario_names
 
@@ -28,6 +29,7 @@ _UsageError: type[typer.BadParameter] = typer.BadParameter.__bases__[0]
 
 def main() -> None:
     """Run the command line; every error is one line on stderr and an exit code."""
+    look_seldom()
     # They add their commands when they are loaded.
     import_module("cspm.cli.recordings")
     import_module("cspm.cli.data")

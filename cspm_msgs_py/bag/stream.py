@@ -21,8 +21,8 @@ from cspm_msgs_py.bag.run import (
     StoredRun,
     in_order,
 )
-from cspm_msgs_py.closing import Closing
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.recording.closing import Closing
 from cspm_msgs_py.ros_types import deserialize, typestore
 
 if TYPE_CHECKING:

@@ -23,7 +23,6 @@ from mcap.records import (
 )
 from mcap.records import ChunkIndex as ChunkIndexRecord
 
-from cspm_msgs_py.closing import Closing
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.recording.chunk import (
     ChunkHead,
@@ -36,6 +35,7 @@ from cspm_msgs_py.recording.chunk import (
     read_index,
     read_messages,
 )
+from cspm_msgs_py.recording.closing import Closing
 from cspm_msgs_py.recording.log_time import LATEST_NS, in_time, index_in_time, left_out
 from cspm_msgs_py.recording.records import (
     HEAD,

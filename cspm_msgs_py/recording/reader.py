@@ -13,10 +13,10 @@ import numpy as np
 from mcap.records import Channel
 from numpy.typing import NDArray
 
-from cspm_msgs_py.closing import Closing
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.message import carries_row
 from cspm_msgs_py.recording.chunk import Messages
+from cspm_msgs_py.recording.closing import Closing
 from cspm_msgs_py.recording.mcap_file import BareFileError, McapFile
 from cspm_msgs_py.recording.rosbag2_metadata import read_bag
 from cspm_msgs_py.recording.rows import RowCollector, Rows

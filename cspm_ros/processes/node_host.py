@@ -10,6 +10,7 @@ from pathlib import Path
 
 from setproctitle import setproctitle
 
+from cspm_msgs_py.garbage import look_seldom
 from cspm_ros.processes.preload import preload
 from cspm_ros.runtime.node_main import ROS_ARGS, main
 
@@ -29,6 +30,7 @@ def host(names: Sequence[str], parameters: str, log: Path, namespace: str) -> in
         namespace: of all of them.
     """
     began = time.perf_counter()
+    look_seldom()
     preload()
     running: dict[int, str] = {}
     for name in names:

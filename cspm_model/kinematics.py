@@ -11,13 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cspm_model.kernels.cable import PULLEY_RADIUS
+from cspm_model.kernels.cable import PULLEY_RADIUS, ROUTE
 from cspm_model.kernels.kinematics import cable_geometry
 from cspm_model.kernels.rotation import (
     body_rate_to_euler_rate,
     euler_rate_to_world_rate,
     rotation_from_euler,
 )
+from cspm_model.kernels.route import STOP_COUNT
 from cspm_msgs_py.errors import InputError, SingularityError
 
 Array = NDArray[np.float64]
@@ -46,8 +47,8 @@ def geometry(cables: Array, bar_pose: ArrayLike, frame_pose: ArrayLike) -> Cable
     """Return lengths and Jacobians for `cables`, the plant's cable parameter rows (n, columns).
 
     Raises:
-        SingularityError: an exit and its attachment coincide, where a cable has no direction, or an
-            attachment lies inside its cable's pulley.
+        SingularityError: an exit and its attachment coincide, where a cable has no direction, or a
+            cable would have to run through a pulley.
     """
     n = len(cables)
     out = CableGeometry(np.empty(n), np.empty((n, 6)), np.empty((n, 6)))
@@ -56,9 +57,12 @@ def geometry(cables: Array, bar_pose: ArrayLike, frame_pose: ArrayLike) -> Cable
         i = int(np.argmin(out.lengths))
         if np.isnan(out.lengths[i]):
             place = ", ".join(f"{value:.4g}" for value in _pose(bar_pose))
+            inside = "its attachment lies inside its pulley"
+            allowed = f"outside its radius of {cables[i, PULLEY_RADIUS]:g} m"
+            if cables[i, ROUTE + STOP_COUNT] > 0.0:
+                inside, allowed = "its route leads through a pulley", "stops outside of pulleys"
             raise SingularityError(
-                f"cable {i}: its attachment lies inside its pulley with the bar at [{place}] (m,"
-                f" rad), allowed: outside its radius of {cables[i, PULLEY_RADIUS]:g} m"
+                f"cable {i}: {inside} with the bar at [{place}] (m, rad), allowed: {allowed}"
             )
         raise SingularityError(f"cable {i}: length 0 m, its direction does not exist")
     return out

@@ -24,7 +24,14 @@ from cspm_model.kernels import bar as bar_kernel
 from cspm_model.kernels import cable as cable_kernel
 from cspm_model.kernels.cable import elastic_tension, law_curve, law_scale
 from cspm_model.kernels.machine import BAR_STATES, PlantParameters
-from cspm_model.kinematics import RANK_TOLERANCE, euler_rates, geometry, rotation
+from cspm_model.kernels.route import STOP_COUNT
+from cspm_model.kinematics import (
+    RANK_TOLERANCE,
+    euler_rate_map,
+    euler_rates,
+    geometry,
+    rotation,
+)
 from cspm_msgs_py.dofs import DOFS
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.scenario_keys.bodies import ORIGIN
@@ -34,6 +41,8 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 ALL_AXES = (0, 1, 2, 3, 4, 5)
+# Of the bar, over twice of which Jacobians of routes are differenced [m, rad].
+ROUTE_STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,13 +306,33 @@ def _geometric_stiffness(parameters: PlantParameters, point: OperatingPoint) -> 
     # A force turns with its exit as it does against the attachment's own motion.
     slopes = end_slopes(cables, point.bar_pose[None], point.frame_pose[None])
     turns = slopes.exit_wrenches[0, :, :3] @ rotation(point.frame_pose).T
-    for i, tension in enumerate(point.tensions):
+    routed = cables[:, cable_kernel.ROUTE + STOP_COUNT] > 0.0
+    out += _route_stiffness(cables[routed], point.tensions[routed], point)
+    for i in np.flatnonzero(~routed):
+        tension = point.tensions[i]
         direction = point.jacobian[i, :3]
         arm = _cross_matrix(to_world @ cables[i, cable_kernel.ATTACHMENT :][:3])
         turn = turns[i] @ np.hstack([np.eye(3), -arm])
         out[:3] -= tension * turn
         out[3:] -= tension * arm @ turn
         out[3:, 3:] -= tension * _cross_matrix(direction) @ arm
+    return out
+
+
+def _route_stiffness(cables: Array, tensions: Array, point: OperatingPoint) -> Array:
+    """Return what cables with routes have of it, by central differences of their Jacobians."""
+    out = np.zeros((6, 6))
+    if not len(cables):
+        return out
+    to_pose = np.eye(6)
+    to_pose[3:, 3:] = np.linalg.inv(euler_rate_map(point.bar_pose))
+    for axis in range(6):
+        step = ROUTE_STEP * to_pose[:, axis]
+        before, after = (
+            tensions @ geometry(cables, point.bar_pose + sign * step, point.frame_pose).bar
+            for sign in (-1.0, 1.0)
+        )
+        out[:, axis] = (before - after) / (2.0 * ROUTE_STEP)
     return out
 
 

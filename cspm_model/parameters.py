@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from cspm_model.kernels import bar as bar_kernel
 from cspm_model.kernels import cable as cable_kernel
+from cspm_model.kernels import route as route_kernel
 from cspm_model.kernels.machine import BAR_STATES, EFFECT_COLUMNS, PlantParameters
 from cspm_model.stiffness import POINTS, law_slope, law_table
 from cspm_msgs_py.testbed import Bar, Cable, ExponentialStiffness, Testbed
+from cspm_msgs_py.testbed_keys.route import Stop, exit_pulley, first_on_bar
 
 Array = NDArray[np.float64]
 
@@ -58,9 +62,13 @@ def _cable_row(cable: Cable, gravity: float) -> tuple[Array, Array]:
     row[cable_kernel.HAS_CABLE] = 1.0
     row[cable_kernel.EXIT : cable_kernel.EXIT + 3] = cable.exit
     row[cable_kernel.ATTACHMENT : cable_kernel.ATTACHMENT + 3] = cable.attachment
-    if cable.pulley:
-        row[cable_kernel.PULLEY_RADIUS] = cable.pulley.radius
-        row[cable_kernel.PULLEY_AXIS : cable_kernel.PULLEY_AXIS + 3] = cable.pulley.direction
+    pulley = exit_pulley(cable.route) if cable.route else cable.pulley
+    if pulley:
+        row[cable_kernel.PULLEY_RADIUS] = pulley.radius
+        row[cable_kernel.PULLEY_AXIS : cable_kernel.PULLEY_AXIS + 3] = pulley.direction
+    # A route of exit and attachment alone is a cable without one.
+    if cable.route and len(cable.route) > 2:
+        row[cable_kernel.ROUTE :] = _route_columns(cable.route)
     row[cable_kernel.OFFSET_LENGTH] = cable.offset_length
     row[cable_kernel.AXIAL_RIGIDITY] = law.axial_rigidity
     row[cable_kernel.FLOOR_TENSION] = law.floor_tension
@@ -75,3 +83,17 @@ def _cable_row(cable: Cable, gravity: float) -> tuple[Array, Array]:
         row[cable_kernel.TABLE_STEP] = step
         row[cable_kernel.TABLE_STEPS] = 1.0 / step
     return row, table
+
+
+def _route_columns(route: Sequence[Stop]) -> Array:
+    """Return a route's columns, see `kernels.route`; its first stop is the exit."""
+    columns = np.zeros(route_kernel.ROUTE_COLUMNS)
+    columns[route_kernel.STOP_COUNT] = len(route) - 1
+    stops = columns[route_kernel.FIRST_STOP :].reshape(-1, route_kernel.STOP_COLUMNS)
+    for row, stop in zip(stops, route[1:], strict=False):
+        on_bar = stop.on == "bar"
+        row[route_kernel.BODY] = route_kernel.ON_BAR if on_bar else route_kernel.ON_FRAME
+        row[route_kernel.PLACE : route_kernel.PLACE + 3] = stop.at
+        row[route_kernel.RADIUS] = stop.radius or 0.0
+    stops[first_on_bar(route) - 1, route_kernel.BODY] = route_kernel.AT_ATTACHMENT
+    return columns

@@ -30,22 +30,22 @@ from cspm_msgs_py.provenance import Provenance, unwrap_provenance
 from cspm_msgs_py.sensor_spec import Sensor, check_sensor_topics
 from cspm_msgs_py.testbed_keys.effect_table import EMPIRICAL, EffectTable
 from cspm_msgs_py.testbed_keys.plausible import (
-    Coordinate,
     Diameter,
     DrumRadius,
     Extent,
     Mass,
     Modulus,
+    Point,
     RotorInertia,
     Tension,
     Torque,
 )
 from cspm_msgs_py.testbed_keys.pulley import Parts, Pulley
+from cspm_msgs_py.testbed_keys.route import Route, check_route, first_on_bar
 from cspm_msgs_py.testbed_keys.winch_load import WinchLoad
 from cspm_msgs_py.topics import Topic, contract_topics
 from cspm_msgs_py.yaml_file import StrictModel, parse_yaml, read_text, validate
 
-Point = tuple[Coordinate, Coordinate, Coordinate]
 Extents = tuple[Extent, Extent, Extent]
 SafetyFactor = Annotated[float, Field(ge=1.0)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
@@ -156,7 +156,8 @@ class Cable(StrictModel):
     """One winch with its drum, gear and cable. A winch without cable has no `exit`, or a `load`.
 
     A `locked` winch is held by its brake: its motor angle is constant, measured or not. Of `parts`
-    between two blocks each carries the tension.
+    between two blocks each carries the tension. A `route` takes the place of exit, attachment,
+    pulley and parts: exit and attachment are then its first stop and its first one on the bar.
     `breaking_force` [N] is its maker's; `safety_factor` takes the place of the machine's.
     """
 
@@ -165,6 +166,7 @@ class Cable(StrictModel):
     attachment: Point | None = None
     pulley: Pulley | None = None
     parts: Parts = 1
+    route: Route | None = None
     offset_length: NonNegativeFloat = 0.0
     stiffness: (
         Annotated[ExponentialStiffness | LinearStiffness, Field(discriminator="law")] | None
@@ -186,6 +188,21 @@ class Cable(StrictModel):
         if limits and not limits[0] < limits[1]:
             raise ValueError(f"[{limits[0]:g}, {limits[1]:g}], allowed: t_min < t_max")
         return limits
+
+    @model_validator(mode="after")
+    def _routed(self) -> Self:
+        if self.route is None:
+            return self
+        check_route(self.route, self.name)
+        if self.pulley or self.parts > 1:
+            key = "pulley" if self.pulley else "parts"
+            raise ValueError(f"{key}: of {self.name}, which has a route, allowed: its stops say it")
+        ends = {"exit": self.route[0].at, "attachment": self.route[first_on_bar(self.route)].at}
+        for key, place in ends.items():
+            if getattr(self, key) not in (None, place):
+                raise ValueError(f"{key}: of {self.name}, which has a route, allowed: none")
+            object.__setattr__(self, key, place)
+        return self
 
     @model_validator(mode="after")
     def _whole_cable(self) -> Self:
@@ -215,6 +232,13 @@ class Cable(StrictModel):
     def has_cable(self) -> bool:
         """Whether a cable runs from this winch."""
         return self.exit is not None
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the cable is one straight line from exit to attachment."""
+        if self.route is not None:
+            return len(self.route) == 2 and self.route[0].radius is None
+        return self.pulley is None and self.parts == 1
 
 
 def _kind_of_parameters(parameters: object) -> str:

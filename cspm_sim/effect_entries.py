@@ -77,7 +77,12 @@ def read_actions(testbed: Testbed) -> list[Action]:
 def _check_parts(action: Action, testbed: Testbed) -> None:
     """Refuse what is derived for a single span, on a cable of several parts."""
     if Hook.ATTACHMENT in action.effect.physics.kernels:
-        parts = testbed.cables[action.element].parts
+        cable = testbed.cables[action.element]
+        if cable.route:
+            raise InputError(
+                f"{action.where}: {action.name} has a route, allowed: cables without one"
+            )
+        parts = cable.parts
         if parts > 1:
             raise InputError(
                 f"{action.where}: {action.name} has {parts} parts, allowed: cables of one part"

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cspm_control.analysis.pose_grid import Grid
-from cspm_control.analysis.workspace_kernels import POINT, all_structures
+from cspm_control.analysis.workspace_kernels import all_structures
 from cspm_model.kernels import bar as bar_kernel
-from cspm_model.kernels.cable import ATTACHMENT, EXIT, PARTS, PULLEY_RADIUS
+from cspm_model.kernels.cable import ATTACHMENT, EXIT
 from cspm_model.parameters import nominal_parameters
 from cspm_model.spanned_axes import spanned_axes, structures_at
 from cspm_msgs_py.errors import InputError
@@ -24,24 +24,35 @@ class CableStructure(NamedTuple):
 
     Attributes:
         axes: rows of the wrench that the cables are to meet: those that they give independently.
-        outlets: where cables leave the frame, (n, OUTLET_COLUMNS) of `workspace_kernels`.
-        attachments: (n, 3) in bar_ned [m].
+        cables: parameter rows, (n, CABLE_COLUMNS) of `cspm_model.kernels.cable`.
         limits: tensions (n, 2) [N].
         weight: of the bar [N].
         com: its centre of mass in bar_ned [m].
     """
 
     axes: tuple[int, ...]
-    outlets: Array
-    attachments: Array
+    cables: Array
     limits: Array
     weight: float
     com: Array
 
     @property
     def exits(self) -> Array:
-        """The points of the outlets, (n, 3) [m]."""
-        return self.outlets[:, POINT : POINT + 3]
+        """Where cables leave the frame, (n, 3) [m]."""
+        return self.cables[:, EXIT : EXIT + 3]
+
+    @property
+    def attachments(self) -> Array:
+        """Where they meet the bar first, (n, 3) in bar_ned [m]."""
+        return self.cables[:, ATTACHMENT : ATTACHMENT + 3]
+
+    def bodies(self, grid: Grid) -> tuple[Array, Array, Array]:
+        """Return a grid's positions (P, 3), rotations row by row (Q, 9), and arms (Q, n, 3) [m].
+
+        Arms run from the bar's origin to the attachments, in world axes.
+        """
+        arms = np.ascontiguousarray(np.einsum("qij,nj->qni", grid.rotations, self.attachments))
+        return grid.positions, np.ascontiguousarray(grid.rotations).reshape(-1, 9), arms
 
 
 def cable_structure(testbed: Testbed, pose: ArrayLike) -> CableStructure:
@@ -63,8 +74,7 @@ def cable_structure(testbed: Testbed, pose: ArrayLike) -> CableStructure:
         )
     return CableStructure(
         axes,
-        np.hstack([cables[:, EXIT : EXIT + 3], cables[:, PULLEY_RADIUS : PARTS + 1]]),
-        cables[:, ATTACHMENT : ATTACHMENT + 3],
+        cables,
         np.array([cable.tension_limits for cable in testbed.cables], dtype=float),
         float(bar[bar_kernel.MASS] * bar[bar_kernel.GRAVITY]),
         bar[bar_kernel.COM : bar_kernel.COM + 3].copy(),
@@ -76,9 +86,8 @@ def structures(machine: CableStructure, grid: Grid) -> Array:
 
     Orientations are fastest. NaN where a cable has no direction, as inside its pulley.
     """
-    arms = np.ascontiguousarray(np.einsum("qij,nj->qni", grid.rotations, machine.attachments))
-    out = np.empty((grid.size, len(machine.axes), len(machine.outlets)))
-    all_structures(grid.positions, arms, machine.outlets, np.array(machine.axes), out)
+    out = np.empty((grid.size, len(machine.axes), len(machine.cables)))
+    all_structures(*machine.bodies(grid), machine.cables, np.array(machine.axes), out)
     return out
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cspm_model.catenary import HangingCable, ernst_share, hang
 from cspm_model.equilibrium import NOTHING, Equilibrium, find_equilibrium
-from cspm_model.kernels.cable import ATTACHMENT, EXIT, OFFSET_LENGTH, PARTS, PULLEY_RADIUS
+from cspm_model.kernels.cable import ATTACHMENT, EXIT, OFFSET_LENGTH
 from cspm_model.kernels.machine import PlantParameters
 from cspm_model.kinematics import rotation
 from cspm_model.linearisation import operating_point
@@ -63,7 +63,7 @@ def sagging_cables(
         ConvergenceError: no tensions within the limits hold bar and cables.
     """
     parameters = nominal_parameters(testbed)
-    _check_straight(testbed, parameters)
+    _check_straight(testbed)
     limits = np.array([cable.tension_limits for cable in testbed.cables], dtype=float)
     straight = operating_point(testbed, parameters, pose)
     elastic = straight.unstretched_lengths + parameters.cables[:, OFFSET_LENGTH]
@@ -138,9 +138,9 @@ def _ends(parameters: PlantParameters, pose: Array) -> tuple[Array, Array]:
     return pose[:3] + arms - cables[:, EXIT : EXIT + 3], arms
 
 
-def _check_straight(testbed: Testbed, parameters: PlantParameters) -> None:
-    for cable, row in zip(testbed.cables, parameters.cables, strict=True):
-        if row[PULLEY_RADIUS] > 0.0 or row[PARTS] > 1.0:
+def _check_straight(testbed: Testbed) -> None:
+    for cable in testbed.cables:
+        if not cable.is_straight:
             raise InputError(
                 f"{testbed.name}: {cable.name} has a pulley or several parts, allowed: straight"
                 " cables of one part"

@@ -44,10 +44,9 @@ def static_workspace(
     extra: tuple[NDArray[np.int64], ...] = ()
     if algorithm == "general":
         kernel, extra = general_holds, (_bases(machine),)
-    arms = np.ascontiguousarray(np.einsum("qij,nj->qni", grid.rotations, machine.attachments))
     out = np.zeros(grid.size, dtype=np.bool_)
     fixed = (
-        *(grid.positions, arms, machine.outlets, np.array(machine.axes)),
+        *(*machine.bodies(grid), machine.cables, np.array(machine.axes)),
         wanted_at_rest(machine, grid),
     )
     work = partial(_chunk, kernel, (*fixed, machine.limits[:, 1].copy(), *extra, out))
@@ -76,4 +75,4 @@ def _workers() -> int:
 
 
 def _bases(machine: CableStructure) -> NDArray[np.int64]:
-    return np.array(list(combinations(range(len(machine.outlets)), len(machine.axes))))
+    return np.array(list(combinations(range(len(machine.cables)), len(machine.axes))))

@@ -12,27 +12,39 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cspm_model.kernels.cable import EXIT, PARTS, PULLEY_AXIS, PULLEY_RADIUS, ROUTE, routed
 from cspm_model.kernels.pulley import around_pulley
+from cspm_model.kernels.rotation import Placement
+from cspm_model.kernels.route import STOP_COUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-# Columns of an outlet, where a cable leaves the winch frame.
-POINT = 0  # [m]
-PULLEY_RADIUS = 3  # [m]; 0 without a pulley
-PULLEY_AXIS = 4
-PARTS = 7
-OUTLET_COLUMNS = 8
-
 # A pivot below this share of the largest entry: the columns are no basis.
 SMALLEST_PIVOT = 1e-9
 # Share of the wanted wrench that a tension may be beyond its limit, for round-off.
 ROUND_OFF = 1e-9
+# The winch frame is at the origin.
+_STILL = (0.0, 0.0, 0.0)
+_FRAME = (_STILL, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), _STILL, _STILL)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def structure(position: Array, arms: Array, outlets: Array, axes: Integers, out: Array) -> bool:
+def _placement(place: Array, turn: Array) -> Placement:
+    """Return a bar at rest."""
+    rotation = (
+        *(turn[0], turn[1], turn[2]),
+        *(turn[3], turn[4], turn[5]),
+        *(turn[6], turn[7], turn[8]),
+    )
+    return (place[0], place[1], place[2]), rotation, _STILL, _STILL
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def structure(
+    position: Array, turn: Array, arms: Array, cables: Array, axes: Integers, out: Array
+) -> bool:
     """Write −Jᵀ of (2-13), rows `axes` of force and moment in world axes, to `out` (m, n).
 
     False, with NaN in all of `out`, where a cable has no direction: its attachment is at its exit
@@ -40,27 +52,35 @@ def structure(position: Array, arms: Array, outlets: Array, axes: Integers, out:
 
     Args:
         position: of the bar, (3,) [m].
+        turn: the bar's rotation, row by row, (9,).
         arms: from the bar's origin to the attachments, world axes, (n, 3) [m].
-        outlets: (n, OUTLET_COLUMNS).
+        cables: parameter rows, see `cspm_model.kernels.cable`.
         axes: rows that are written, (m,).
         out: (m, n).
     """
     for i in range(arms.shape[0]):
         bx, by, bz = arms[i, 0], arms[i, 1], arms[i, 2]
-        x = position[0] + bx - outlets[i, POINT]
-        y = position[1] + by - outlets[i, POINT + 1]
-        z = position[2] + bz - outlets[i, POINT + 2]
-        scale = -outlets[i, PARTS]
-        if outlets[i, PULLEY_RADIUS] > 0.0:
-            axis = outlets[i, PULLEY_AXIS], outlets[i, PULLEY_AXIS + 1], outlets[i, PULLEY_AXIS + 2]
-            _, (x, y, z) = around_pulley((x, y, z), axis, outlets[i, PULLEY_RADIUS])
+        x = position[0] + bx - cables[i, EXIT]
+        y = position[1] + by - cables[i, EXIT + 1]
+        z = position[2] + bz - cables[i, EXIT + 2]
+        scale = -cables[i, PARTS]
+        cx = cy = cz = 0.0
+        if cables[i, ROUTE + STOP_COUNT] > 0.0:
+            body = _placement(position, turn)
+            _, (x, y, z), (cx, cy, cz) = routed(cables, i, _FRAME, body, (bx, by, bz))
+        elif cables[i, PULLEY_RADIUS] > 0.0:
+            axis = cables[i, PULLEY_AXIS], cables[i, PULLEY_AXIS + 1], cables[i, PULLEY_AXIS + 2]
+            _, (x, y, z) = around_pulley((x, y, z), axis, cables[i, PULLEY_RADIUS])
         else:
             scale = scale / sqrt(x * x + y * y + z * z)
         x, y, z = x * scale, y * scale, z * scale
         if not isfinite(x + y + z):
             out[:] = nan
             return False
-        column = (x, y, z, by * z - bz * y, bz * x - bx * z, bx * y - by * x)
+        column = (
+            *(x, y, z),
+            *(by * z - bz * y - cx, bz * x - bx * z - cy, bx * y - by * x - cz),
+        )
         for row in range(axes.shape[0]):
             out[row, i] = column[axes[row]]
     return True
@@ -68,12 +88,13 @@ def structure(position: Array, arms: Array, outlets: Array, axes: Integers, out:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def all_structures(
-    positions: Array, arms: Array, outlets: Array, axes: Integers, out: Array
+    positions: Array, turns: Array, arms: Array, cables: Array, axes: Integers, out: Array
 ) -> None:
     """Write `structure` of all poses to `out` (P·Q, m, n); NaN where a cable has no direction."""
     count = arms.shape[0]
     for pose in range(out.shape[0]):
-        structure(positions[pose // count], arms[pose % count], outlets, axes, out[pose])
+        place, k = positions[pose // count], pose % count
+        structure(place, turns[k], arms[k], cables, axes, out[pose])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -115,8 +136,9 @@ def pseudo_inverse_holds(
     first: int,
     last: int,
     positions: Array,
+    turns: Array,
     arms: Array,
-    outlets: Array,
+    cables: Array,
     axes: Integers,
     wrenches: Array,
     most: Array,
@@ -128,8 +150,9 @@ def pseudo_inverse_holds(
         first: the first pose of all.
         last: the one after the last.
         positions: (P, 3) [m].
+        turns: rotations, row by row, (Q, 9).
         arms: (Q, n, 3) [m], one set per orientation.
-        outlets: (n, OUTLET_COLUMNS).
+        cables: parameter rows, see `cspm_model.kernels.cable`.
         axes: rows of the wrench that are to be met, (m,).
         wrenches: wanted of the cables, (Q, m) [N, N·m].
         most: highest tensions (n,) [N].
@@ -138,8 +161,9 @@ def pseudo_inverse_holds(
     n, m, count = arms.shape[1], axes.shape[0], arms.shape[0]
     rows, system = np.empty((m, n)), np.empty((m, m + 1))
     for pose in range(first, last):
-        wrench = wrenches[pose % count]
-        out[pose] = structure(positions[pose // count], arms[pose % count], outlets, axes, rows)
+        place, at = positions[pose // count], pose % count
+        wrench = wrenches[at]
+        out[pose] = structure(place, turns[at], arms[at], cables, axes, rows)
         if not out[pose]:
             continue
         size = 0.0
@@ -167,8 +191,9 @@ def general_holds(
     first: int,
     last: int,
     positions: Array,
+    turns: Array,
     arms: Array,
-    outlets: Array,
+    cables: Array,
     axes: Integers,
     wrenches: Array,
     most: Array,
@@ -181,8 +206,9 @@ def general_holds(
         first: the first pose of all.
         last: the one after the last.
         positions: (P, 3) [m].
+        turns: rotations, row by row, (Q, 9).
         arms: (Q, n, 3) [m], one set per orientation.
-        outlets: (n, OUTLET_COLUMNS).
+        cables: parameter rows, see `cspm_model.kernels.cable`.
         axes: rows of the wrench that are to be met, (m,).
         wrenches: wanted of the cables, (Q, m) [N, N·m].
         most: highest tensions (n,) [N].
@@ -194,8 +220,9 @@ def general_holds(
     # The basis that held the last pose likely holds its neighbour.
     start = 0
     for pose in range(first, last):
-        wrench = wrenches[pose % count]
-        out[pose] = structure(positions[pose // count], arms[pose % count], outlets, axes, rows)
+        place, at = positions[pose // count], pose % count
+        wrench = wrenches[at]
+        out[pose] = structure(place, turns[at], arms[at], cables, axes, rows)
         if not out[pose]:
             continue
         size = 0.0

@@ -22,6 +22,7 @@ from cspm_model.kernels.cable import (
     PULLEY_RADIUS,
     RADIUS,
     RATE,
+    ROUTE,
     SPAN_COLUMNS,
     cable_spans,
     elastic_tension,
@@ -38,6 +39,7 @@ from cspm_model.kernels.rotation import (
     rotate,
     rotation_from_euler,
 )
+from cspm_model.kernels.route import STOP_COUNT
 
 Array = NDArray[np.float64]
 
@@ -49,6 +51,8 @@ FRESH, PERIOD = 0, 1
 # Newton steps from here [m] to the elongation of a cable at rest; half of them are never needed.
 FIRST_ELONGATION, NEWTON_STEPS = 1e-3, 50
 LEAST_ELONGATION = 1e-9
+# Over twice this time the rate of a cable with a route is differenced [s].
+_STEP = 1e-4
 
 
 class WinchFeedforward:
@@ -144,6 +148,9 @@ def winding_accelerations(
     cable_spans(cables, base, _placement(bar), spans)
     for i in range(cables.shape[0]):
         lengths[i] = spans[i, LENGTH]
+        if cables[i, ROUTE + STOP_COUNT] > 0.0:
+            winding[i] = _over_route(cables[i : i + 1], bar, frame)
+            continue
         if cables[i, PULLEY_RADIUS] > 0.0:
             winding[i] = _over_pulley(cables[i], spans[i], bar, frame, base[1])
             continue
@@ -180,6 +187,40 @@ def _over_pulley(cable: Array, span: Array, bar: Array, frame: Array, rotation: 
         + span[DIRECTION + 2] * (pz - qz - 2.0 * cz)
     )
     return -along - cable[PARTS] * (tx * wx + ty * wy + tz * wz)
+
+
+@njit(cache=True, error_model="numpy")
+def _over_route(cable: Array, bar: Array, frame: Array) -> float:
+    """Return −l̈ [m/s²] of a cable with a route, as a central difference of l̇; its row (1, …)."""
+    spans = np.empty((2, SPAN_COLUMNS))
+    for side, time in enumerate((-_STEP, _STEP)):
+        base, body = _moved(frame, time), _moved(bar, time)
+        cable_spans(cable, base, body, spans[side : side + 1])
+    return (spans[0, RATE] - spans[1, RATE]) / (2.0 * _STEP)
+
+
+@njit(cache=True, error_model="numpy")
+def _moved(row: Array, time: float) -> Placement:
+    """Return a body's placement a little later, or earlier, than in a reference row.
+
+    What is left out is of second order in time, alike on both sides.
+    """
+    (px, py, pz), turn, (vx, vy, vz), (wx, wy, wz) = _placement(row)
+    # R + t·ω × R, column by column.
+    ax, ay, az = cross(wx, wy, wz, turn[0], turn[3], turn[6])
+    bx, by, bz = cross(wx, wy, wz, turn[1], turn[4], turn[7])
+    cx, cy, cz = cross(wx, wy, wz, turn[2], turn[5], turn[8])
+    turned = (
+        *(turn[0] + time * ax, turn[1] + time * bx, turn[2] + time * cx),
+        *(turn[3] + time * ay, turn[4] + time * by, turn[5] + time * cy),
+        *(turn[6] + time * az, turn[7] + time * bz, turn[8] + time * cz),
+    )
+    return (
+        (px + time * vx, py + time * vy, pz + time * vz),
+        turned,
+        (vx + time * row[13], vy + time * row[14], vz + time * row[15]),
+        (wx + time * row[16], wy + time * row[17], wz + time * row[18]),
+    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -153,7 +153,8 @@ def identify_geometry(
         held_out: to judge only.
 
     Raises:
-        InputError: recordings that do not go together, see `length_rows`, or no winch that moves.
+        InputError: recordings that do not go together, see `length_rows`, no winch that moves, or a
+            cable with a route.
         ConvergenceError: the search does not settle.
     """
     check_roles(searched, held_out)
@@ -163,6 +164,11 @@ def identify_geometry(
     if not any(np.ptp(rows.wound) > 0.0 for rows in own):
         raise InputError(
             f"{searched[0].path}: no winch moves, allowed: recordings in which one does"
+        )
+    routed = [cable.name for cable in machine.cables if cable.route]
+    if routed:
+        raise InputError(
+            f"{searched[0].path}: {routed[0]} has a route, allowed: cables from exit to attachment"
         )
     fit = calibrate(own)
     errors = _errors(fit, every, found, len(searched))

@@ -174,7 +174,7 @@ def _check_rig(path: Path, testbed: Testbed) -> None:
         raise InputError(
             f"{path}: {testbed.name} has a bar or a winch frame, allowed: cables fixed in the world"
         )
-    bent = [cable.name for cable in testbed.cables if cable.pulley or cable.parts > 1]
+    bent = [cable.name for cable in testbed.cables if not cable.is_straight]
     if bent:
         raise InputError(
             f"{path}: {bent[0]} has a pulley or several parts, allowed: straight cables of one part"

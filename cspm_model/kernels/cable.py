@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from cspm_model.kernels.pulley import around_pulley
 from cspm_model.kernels.rotation import Placement, Vector, cross, rotate
+from cspm_model.kernels.route import ROUTE_COLUMNS, STOP_COUNT, along_route
 
 Array = NDArray[float64]
 
@@ -37,16 +38,41 @@ GRAVITY_HERE = 22
 PULLEY_RADIUS = 23  # 0 without a pulley
 PULLEY_AXIS = 24  # unit vector, winch frame axes
 PARTS = 27  # of the cable, between two blocks
-CABLE_COLUMNS = 28
+ROUTE = 28  # columns of `kernels.route`; no stops where the cable ends at the attachment
+CABLE_COLUMNS = ROUTE + ROUTE_COLUMNS
 
 
 # Columns of a cable's span.
-DIRECTION = 0  # u, from exit to attachment, world axes; times the number of its parts
+DIRECTION = 0  # u, from exit to attachment, world axes; of all parts and stops their sum
 ARM = 3  # R·b, from the body's origin to the attachment, world axes
 LENGTH = 6  # of all parts
 RATE = 7
 TENSION = 8
-SPAN_COLUMNS = 9
+COUPLE = 9  # of a route: what its slope over the body's turn has beyond ARM × DIRECTION [m]
+SPAN_COLUMNS = 12
+
+
+@njit(cache=True, error_model="numpy")
+def routed(
+    cables: Array, i: int, frame: Placement, body: Placement, arm: Vector
+) -> tuple[float, Vector, Vector]:
+    """Return length, direction and couple of a cable with a route."""
+    fp, fr, bp = frame[0], frame[1], body[0]
+    ax, ay, az = rotate(fr, cables[i, EXIT], cables[i, EXIT + 1], cables[i, EXIT + 2])
+    axis = rotate(
+        fr, cables[i, PULLEY_AXIS], cables[i, PULLEY_AXIS + 1], cables[i, PULLEY_AXIS + 2]
+    )
+    length, pull, (mx, my, mz) = along_route(
+        (fp[0] + ax, fp[1] + ay, fp[2] + az),
+        axis,
+        cables[i, PULLEY_RADIUS],
+        (bp[0] + arm[0], bp[1] + arm[1], bp[2] + arm[2]),
+        cables[i, ROUTE:],
+        frame,
+        body,
+    )
+    tx, ty, tz = cross(*arm, *pull)
+    return length, pull, (mx - tx, my - ty, mz - tz)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -76,6 +102,10 @@ def cable_spans(cables: Array, frame: Placement, body: Placement, spans: Array) 
             length, (ux, uy, uz) = around_pulley((x, y, z), axis, cables[i, PULLEY_RADIUS])
             # The cable's line meets the attachment, not the exit.
             ax, ay, az = ax + x, ay + y, az + z
+        cx = cy = cz = 0.0
+        if cables[i, ROUTE + STOP_COUNT] > 0.0:
+            length, (ux, uy, uz), (cx, cy, cz) = routed(cables, i, frame, body, (bx, by, bz))
+            ax, ay, az = bp[0] + bx - fp[0], bp[1] + by - fp[1], bp[2] + bz - fp[2]
         parts = cables[i, PARTS]
         length, ux, uy, uz = parts * length, parts * ux, parts * uy, parts * uz
         ex, ey, ez = cross(fw[0], fw[1], fw[2], ax, ay, az)
@@ -87,7 +117,8 @@ def cable_spans(cables: Array, frame: Placement, body: Placement, spans: Array) 
             ux * (bv[0] + wx - fv[0] - ex)
             + uy * (bv[1] + wy - fv[1] - ey)
             + uz * (bv[2] + wz - fv[2] - ez)
-        )
+        ) + (cx * (bw[0] - fw[0]) + cy * (bw[1] - fw[1]) + cz * (bw[2] - fw[2]))
+        spans[i, COUPLE], spans[i, COUPLE + 1], spans[i, COUPLE + 2] = cx, cy, cz
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -217,5 +248,6 @@ def cable_wrench(spans: Array) -> tuple[Vector, Vector]:
         x, y, z = tension * spans[i, 0], tension * spans[i, 1], tension * spans[i, 2]
         nx, ny, nz = cross(spans[i, ARM], spans[i, ARM + 1], spans[i, ARM + 2], x, y, z)
         fx, fy, fz = fx + x, fy + y, fz + z
-        mx, my, mz = mx + nx, my + ny, mz + nz
+        cx, cy, cz = spans[i, COUPLE], spans[i, COUPLE + 1], spans[i, COUPLE + 2]
+        mx, my, mz = mx + nx + tension * cx, my + ny + tension * cy, mz + nz + tension * cz
     return (fx, fy, fz), (mx, my, mz)

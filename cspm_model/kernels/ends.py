@@ -7,11 +7,15 @@ from numpy.typing import NDArray
 
 from cspm_model.kernels.cable import (
     ARM,
+    ATTACHMENT,
+    COUPLE,
     DIRECTION,
     EXIT,
+    LENGTH,
     PARTS,
     PULLEY_AXIS,
     PULLEY_RADIUS,
+    ROUTE,
     SPAN_COLUMNS,
     cable_spans,
 )
@@ -24,11 +28,14 @@ from cspm_model.kernels.rotation import (
     rotate_back,
     rotation_from_euler,
 )
+from cspm_model.kernels.route import STOP_COUNT
 
 Array = NDArray[float64]
 # Of one instant: lengths' slopes, (n, 3) each, and wrenches' per newton, (n, 6, 3) each; the exits'
 # first.
 Slopes = tuple[Array, Array, Array, Array]
+# Of a cable with a route slopes are central differences over twice this [m].
+_STEP = 1e-5
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -87,6 +94,42 @@ def _cable_slopes(
         wrench[3], wrench[4], wrench[5] = mx + nx, my + ny, mz + nz
 
 
+@njit(cache=True, error_model="numpy")
+def _route_slopes(
+    i: int,
+    cable: Array,
+    first: int,
+    frame: Placement,
+    bar: Placement,
+    lengths: Array,
+    wrenches: Array,
+) -> None:
+    """Write one end's slopes of one cable with a route.
+
+    `cable` is its row, (1, CABLE_COLUMNS), where `first` is the end's column.
+    """
+    ends = np.empty((2, SPAN_COLUMNS))
+    for axis in range(3):
+        place = cable[0, first + axis]
+        for side in range(2):
+            cable[0, first + axis] = place + (_STEP if side == 1 else -_STEP)
+            cable_spans(cable, frame, bar, ends[side : side + 1])
+        cable[0, first + axis] = place
+        lengths[i, axis] = (ends[1, LENGTH] - ends[0, LENGTH]) / (2.0 * _STEP)
+        before, after = _wrench(ends[0]), _wrench(ends[1])
+        for d in range(6):
+            wrenches[i, d, axis] = (after[d] - before[d]) / (2.0 * _STEP)
+
+
+@njit(cache=True, error_model="numpy")
+def _wrench(span: Array) -> tuple[float, float, float, float, float, float]:
+    """Return force and moment about the bar's origin per newton of a cable."""
+    x, y, z = span[DIRECTION], span[DIRECTION + 1], span[DIRECTION + 2]
+    nx, ny, nz = cross(span[ARM], span[ARM + 1], span[ARM + 2], x, y, z)
+    cx, cy, cz = span[COUPLE], span[COUPLE + 1], span[COUPLE + 2]
+    return -x, -y, -z, -nx - cx, -ny - cy, -nz - cz
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def end_slopes_along(cables: Array, bars: Array, frames: Array, out: Slopes) -> None:
     """Write the slopes at poses `bars` and `frames`, (k, 6) each.
@@ -100,4 +143,9 @@ def end_slopes_along(cables: Array, bars: Array, frames: Array, out: Slopes) -> 
         cable_spans(cables, frame, bar, spans)
         here = (out[0][k], out[1][k], out[2][k], out[3][k])
         for i in range(cables.shape[0]):
-            _cable_slopes(i, cables[i], spans[i], frame, bar, here)
+            if cables[i, ROUTE + STOP_COUNT] > 0.0:
+                cable = cables[i : i + 1].copy()
+                _route_slopes(i, cable, EXIT, frame, bar, here[0], here[2])
+                _route_slopes(i, cable, ATTACHMENT, frame, bar, here[1], here[3])
+            else:
+                _cable_slopes(i, cables[i], spans[i], frame, bar, here)

@@ -7,14 +7,17 @@ from numpy.typing import NDArray
 
 from cspm_model.kernels.cable import (
     ARM,
+    COUPLE,
     DIRECTION,
     EXIT,
     LENGTH,
     PULLEY_RADIUS,
+    ROUTE,
     SPAN_COLUMNS,
     cable_spans,
 )
 from cspm_model.kernels.rotation import cross, rotate, rotation_from_euler
+from cspm_model.kernels.route import STOP_COUNT
 
 Array = NDArray[float64]
 
@@ -40,7 +43,7 @@ def cable_geometry(
         ax, ay, az = rotate(
             base_rotation, cables[i, EXIT], cables[i, EXIT + 1], cables[i, EXIT + 2]
         )
-        if cables[i, PULLEY_RADIUS] > 0.0:
+        if cables[i, PULLEY_RADIUS] > 0.0 or cables[i, ROUTE + STOP_COUNT] > 0.0:
             # The cable's line meets the attachment, not the exit.
             ax, ay, az = (
                 bar_pose[0] + bx - frame_pose[0],
@@ -49,7 +52,9 @@ def cable_geometry(
             )
         lengths[i] = spans[i, LENGTH]
         bar[i, 0], bar[i, 1], bar[i, 2] = ux, uy, uz
-        bar[i, 3], bar[i, 4], bar[i, 5] = cross(bx, by, bz, ux, uy, uz)
+        cx, cy, cz = spans[i, COUPLE], spans[i, COUPLE + 1], spans[i, COUPLE + 2]
+        tx, ty, tz = cross(bx, by, bz, ux, uy, uz)
+        bar[i, 3], bar[i, 4], bar[i, 5] = tx + cx, ty + cy, tz + cz
         frame[i, 0], frame[i, 1], frame[i, 2] = -ux, -uy, -uz
         mx, my, mz = cross(ax, ay, az, ux, uy, uz)
-        frame[i, 3], frame[i, 4], frame[i, 5] = -mx, -my, -mz
+        frame[i, 3], frame[i, 4], frame[i, 5] = -mx - cx, -my - cy, -mz - cz

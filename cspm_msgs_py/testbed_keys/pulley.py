@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field
 
 from cspm_msgs_py.testbed_keys.plausible import DrumRadius
 from cspm_msgs_py.yaml_file import StrictModel
@@ -16,6 +16,16 @@ MOST_PARTS = 16
 Parts = Annotated[int, Field(ge=1, le=MOST_PARTS)]
 
 
+def _has_direction(axis: tuple[float, float, float]) -> tuple[float, float, float]:
+    length = float(np.linalg.norm(axis))
+    if not (np.isfinite(length) and length > 0.0):
+        raise ValueError(f"{list(axis)}, allowed: three finite numbers, not all 0")
+    return axis
+
+
+Axis = Annotated[tuple[float, float, float], AfterValidator(_has_direction)]
+
+
 class Pulley(StrictModel):
     """A pulley of `radius` [m] that swivels about `axis`, in winch_frame_ned.
 
@@ -23,15 +33,7 @@ class Pulley(StrictModel):
     """
 
     radius: DrumRadius
-    axis: tuple[float, float, float]
-
-    @field_validator("axis")
-    @classmethod
-    def _has_direction(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
-        length = float(np.linalg.norm(axis))
-        if not (np.isfinite(length) and length > 0.0):
-            raise ValueError(f"{list(axis)}, allowed: three finite numbers, not all 0")
-        return axis
+    axis: Axis
 
     @property
     def direction(self) -> NDArray[np.float64]:

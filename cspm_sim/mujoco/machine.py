@@ -122,7 +122,7 @@ def _add_winches(
 
 def _check_straight(testbed: Testbed) -> None:
     for cable in testbed.cables:
-        if cable.pulley or cable.parts > 1:
+        if not cable.is_straight:
             raise InputError(
                 f"test-bed {testbed.name}: {cable.name} has a pulley or several parts, allowed with"
                 " --plant mujoco: straight cables of one part; the own plant has both"

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from machines import build, general_content, pulley_content, random_poses
+from machines import build, general_content, pulley_content, random_poses, route_content
 from scipy.spatial.transform import Rotation
 
 from cspm_model.end_slopes import end_slopes
@@ -18,7 +18,11 @@ TENSIONS = np.linspace(5.0, 40.0, 8)
 STEP = 1e-6
 MACHINES = {
     name: nominal_parameters(build(content)).cables
-    for name, content in (("points", general_content()), ("pulleys", pulley_content()))
+    for name, content in (
+        ("points", general_content()),
+        ("pulleys", pulley_content()),
+        ("routes", route_content()),
+    )
 }
 
 

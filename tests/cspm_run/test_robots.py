@@ -109,6 +109,24 @@ def test_a_robot_with_pulleys_and_a_block_follows_its_reference():
     assert lengths[1][4] == pytest.approx(2.0 * lengths[0][4])
 
 
+def test_a_robot_with_a_block_on_its_bar_follows_its_reference():
+    straight = cspm.load_testbed("ipanema")
+    cable = straight.file.testbed.cables[4]
+    beside = [place + 0.1 for place in cable.exit]
+    route = [
+        {"on": "frame", "at": list(cable.exit)},
+        {"on": "bar", "at": list(cable.attachment), "radius": 0.03},
+        {"on": "frame", "at": beside},
+    ]
+    reeved = straight.with_parameter("cables[4].route", route)
+    run = cspm.simulate("ipanema", testbed=reeved, duration=1.0)
+    assert run.failure is None
+    for dof in ("surge", "sway", "heave"):
+        assert run.errors[dof]["rms"] < 0.02, dof
+    pulls = geometry(nominal_parameters(reeved.file.testbed).cables, REST, np.zeros(6)).bar
+    assert np.linalg.norm(pulls[4, :3]) == pytest.approx(2.0, abs=0.01)
+
+
 def test_a_suspended_plate_hangs_tilted_beside_its_middle():
     _, pose, rest, _ = aside("suspended_four")
     assert abs(rest.bar_pose[4] - pose[4]) > 0.05

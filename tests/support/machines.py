@@ -115,6 +115,45 @@ def pulley_content():
     return content
 
 
+def stop(body, place, **more):
+    """A stop of a route."""
+    return {"on": body, "at": list(place), **more}
+
+
+def routed(cable, *stops, **first):
+    """A cable with a route from its exit; its attachment and the rest are stops."""
+    rest = {key: value for key, value in cable.items() if key not in ("exit", "attachment")}
+    return {**rest, "route": [stop("frame", cable["exit"], **first), *stops]}
+
+
+def route_content():
+    """The general machine with blocks, tackles and pulleys in a row on five cables."""
+    content = general_content()
+    cables = content["cables"]
+    ends = [cable["attachment"] for cable in cables]
+    up, down = {"radius": 0.03, "axis": [0.1, 0, -1]}, {"radius": 0.02, "axis": [0, 0.2, 1]}
+    cables[0] = routed(cables[0], stop("bar", ends[0]), stop("frame", (0.6, 0.9, -0.35)))
+    cables[1] = routed(
+        cables[1], stop("bar", ends[1], radius=0.05), stop("frame", (0.6, -0.7, -0.4)), **up
+    )
+    cables[2] = routed(
+        cables[2],
+        stop("bar", ends[2], radius=0.04),
+        stop("frame", (-0.7, 0.9, -0.3), radius=0.06),
+        stop("bar", (-0.3, 0.1, 0.0)),
+    )
+    cables[3] = routed(
+        cables[3], stop("frame", (-0.6, -0.5, -0.4), radius=0.05), stop("bar", ends[3]), **down
+    )
+    cables[4] = routed(
+        cables[4],
+        stop("bar", ends[4], radius=0.03),
+        stop("bar", (-0.1, -0.2, 0.05), radius=0.05),
+        stop("frame", (-0.2, -0.8, -0.3)),
+    )
+    return content
+
+
 def entry(effect, elements=(), **parameters):
     """One entry of a machine's `effects`."""
     return {"effect": effect, "elements": list(elements), "parameters": parameters}

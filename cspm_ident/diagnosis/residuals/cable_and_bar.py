@@ -283,7 +283,8 @@ class Suspension:
     def pulled(self, i: int, tensions: Array) -> Array:
         """Return force and moment of cable i's tensions, (k,) [N], on the bar, (k, 6)."""
         pull = -tensions[:, None] * self._spans.directions[:, i]
-        return np.hstack([pull, np.cross(self._spans.arms[:, i], pull)])
+        couple = tensions[:, None] * self._spans.couples[:, i]
+        return np.hstack([pull, np.cross(self._spans.arms[:, i], pull) - couple])
 
     @cached_property
     def cable_wrench(self) -> Array:

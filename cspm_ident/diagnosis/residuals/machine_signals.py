@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from cspm_ident.signals.timeline import Timeline, whole_stretches
-from cspm_model.kernels.cable import ARM, DIRECTION, LENGTH, RATE, SPAN_COLUMNS
+from cspm_model.kernels.cable import ARM, COUPLE, DIRECTION, LENGTH, RATE, SPAN_COLUMNS
 from cspm_model.kernels.trajectory import Motions, spans_along
 
 Array = NDArray[np.float64]
@@ -167,12 +167,14 @@ class CableSpans(NamedTuple):
         arms: from the bar's origin to the attachment, (k, n, 3) [m].
         lengths: (k, n) [m].
         rates: (k, n) [m/s].
+        couples: of routes, beyond the moment of the direction at the attachment, (k, n, 3) [m].
     """
 
     directions: Array
     arms: Array
     lengths: Array
     rates: Array
+    couples: Array
 
     def only(self, i: int) -> CableSpans:
         """Return cable i's alone, n = 1."""
@@ -192,7 +194,7 @@ def cable_spans(
     """
     out = np.empty((len(signals.times), len(cables), SPAN_COLUMNS))
     spans_along(cables, _motions(signals.frame, frame), _motions(signals.bar, bar), out)
-    columns = (slice(DIRECTION, ARM), slice(ARM, LENGTH), LENGTH, RATE)
+    columns = (slice(DIRECTION, ARM), slice(ARM, LENGTH), LENGTH, RATE, slice(COUPLE, COUPLE + 3))
     return CableSpans(*(np.ascontiguousarray(out[:, :, column]) for column in columns))
 
 

@@ -1,10 +1,12 @@
 """A winch frame that is beside where its sensor says."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cspm_model.kinematics import rotation
 from cspm_msgs_py.dofs import DOFS
-from cspm_msgs_py.testbed import Testbed
+from cspm_msgs_py.testbed import Cable, Testbed
 from cspm_sim.effects.alteration import altered_cable
 from cspm_sim.effects.effect import (
     Array,
@@ -23,13 +25,37 @@ from cspm_sim.effects.survey import ACCURACY, healthy
 
 
 def _alter(testbed: Testbed, element: int, values: Values) -> Testbed:
-    """Move all exits: the frame's own pose remains what its sensor measures."""
-    pose = [values[dof] for dof in DOFS]
+    """Move what is on the frame: its own pose remains what its sensor measures."""
+    pose = np.array([values[dof] for dof in DOFS])
     for i, cable in enumerate(testbed.cables):
         if cable.exit is not None:
-            moved = np.array(pose[:3]) + rotation(pose) @ np.array(cable.exit)
-            testbed = altered_cable(testbed, i, exit=moved.tolist())
+            testbed = altered_cable(testbed, i, **_moved(cable, pose))
     return testbed
+
+
+def _moved(cable: Cable, pose: Array) -> dict[str, object]:
+    """Return what of a cable goes with the frame: its exit, stops of its route, and pulley axes."""
+    turn = rotation(pose)
+
+    def there(place: Sequence[float]) -> list[float]:
+        return [float(x) for x in pose[:3] + turn @ np.array(place)]
+
+    def along(axis: Sequence[float]) -> list[float]:
+        return [float(x) for x in turn @ np.array(axis)]
+
+    changes: dict[str, object] = {"exit": there(cable.exit or ())}
+    if cable.pulley:
+        changes["pulley"] = {"radius": cable.pulley.radius, "axis": along(cable.pulley.axis)}
+    if cable.route:
+        changes["route"] = [
+            {
+                **stop.model_dump(),
+                **({"at": there(stop.at)} if stop.on == "frame" else {}),
+                **({"axis": along(stop.axis)} if stop.axis else {}),
+            }
+            for stop in cable.route
+        ]
+    return changes
 
 
 def _columns(signals: Array) -> Array:

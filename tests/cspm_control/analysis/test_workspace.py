@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from altered_machines import CENTRE, THESIS, with_bar, with_cables
-from machines import build, general_content, point_content, pulley_content
+from machines import build, general_content, point_content, pulley_content, route_content
 from scipy.optimize import linprog
 
 from cspm_control.analysis.cable_structure import cable_structure, structures, wanted_at_rest
@@ -13,11 +13,11 @@ from cspm_control.analysis.manipulability import conditions, measures
 from cspm_control.analysis.pose_grid import GRIDS, Grid, steps, workspace_grids
 from cspm_control.analysis.published_workspace import OURS, workspace_claims
 from cspm_control.analysis.workspace import ALGORITHMS, CHUNK, static_workspace
-from cspm_control.analysis.workspace_kernels import PULLEY_AXIS, PULLEY_RADIUS
 from cspm_control.analysis.workspace_limits import limits, sweep
 from cspm_control.analysis.workspace_result import analyse_workspace
 from cspm_control.analysis.wrench_set import wrench_set
 from cspm_model.equilibrium import gravity_wrench
+from cspm_model.kernels.cable import PULLEY_AXIS, PULLEY_RADIUS
 from cspm_model.kinematics import geometry
 from cspm_model.parameters import nominal_parameters
 from cspm_msgs_py.errors import InputError
@@ -29,6 +29,7 @@ MACHINES = {
     "general": GENERAL,
     "centre_of_mass_off": with_bar(THESIS, com=(0.02, 0.0, 0.01)),
     "pulleys": build(pulley_content()),
+    "routes": build(route_content()),
 }
 
 
@@ -55,7 +56,7 @@ def structure_at(testbed, axes, pose):
 def test_structures_and_wrenches_are_those_of_the_plant(name):
     testbed, grid = MACHINES[name], ragged(0, 2)
     machine = cable_structure(testbed, CENTRE)
-    assert len(machine.axes) == (6 if name in ("general", "pulleys") else 5)
+    assert len(machine.axes) == (6 if name in ("general", "pulleys", "routes") else 5)
     found = structures(machine, grid)
     turns = len(grid.pitch) * len(grid.yaw)
     for i, pose in enumerate(poses_of(grid)):
@@ -133,12 +134,10 @@ def test_on_the_thesis_slices_bases_find_all_that_any_tensions_hold():
 def test_a_pose_inside_a_pulley_is_outside_the_workspace():
     """Though the other cables could hold the bar there; a pose beside it is judged as ever."""
     plain = cable_structure(THESIS, CENTRE)
-    outlets = plain.outlets.copy()
-    outlets[0, PULLEY_RADIUS], outlets[0, PULLEY_AXIS] = 0.8, 1.0
-    machine = plain._replace(outlets=outlets)
-    others = plain._replace(
-        outlets=plain.outlets[1:], attachments=plain.attachments[1:], limits=plain.limits[1:]
-    )
+    cables = plain.cables.copy()
+    cables[0, PULLEY_RADIUS], cables[0, PULLEY_AXIS] = 0.8, 1.0
+    machine = plain._replace(cables=cables)
+    others = plain._replace(cables=plain.cables[1:], limits=plain.limits[1:])
     zero = np.zeros(1)
     grid = Grid(zero, zero, np.array([1.0, 2.0]), zero, zero)
     found = structures(machine, grid)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from machines import build, pulley_content
+from machines import build, pulley_content, route_content
 from run_samples import bundle_of
 
 from bench.results.tracking import Case, follow
@@ -40,6 +40,7 @@ MACHINE = nominal_parameters(bundle_of("rest").testbed.testbed)
 CABLES = MACHINE.cables
 N = len(CABLES)
 PULLEYS = nominal_parameters(build(pulley_content())).cables
+ROUTES = nominal_parameters(build(route_content())).cables
 PERIOD = 1e-3
 # Where bar and frame are at t = 0, x y z φ θ ψ, how fast, and how that changes.
 BAR = np.array(
@@ -85,7 +86,9 @@ def feedforward(bandwidth=None):
 
 
 @pytest.mark.parametrize(
-    ("cables", "least"), [(CABLES, 0.1), (PULLEYS, 0.02)], ids=["straight", "pulleys"]
+    ("cables", "least"),
+    [(CABLES, 0.1), (PULLEYS, 0.02), (ROUTES, 0.02)],
+    ids=["straight", "pulleys", "routes"],
 )
 def test_the_winding_acceleration_is_the_second_difference_of_lengths(cables, least):
     h = 1e-4

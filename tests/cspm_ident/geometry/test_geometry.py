@@ -13,6 +13,7 @@ from cspm_ident.geometry.identify_geometry import identify_geometry
 from cspm_ident.signals.samples import Samples
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import parse_testbed
+from cspm_msgs_py.testbed_keys.route import Stop
 
 NOISE = 1e-4
 # Without turns of either body, ends that move alike change no length.
@@ -169,3 +170,11 @@ def test_what_is_missing_is_named():
         identify_geometry([good.with_samples("angle", still)])
     with pytest.raises(InputError, match="rows with all poses and angles, allowed: 50 and more"):
         identify_geometry([good.within(1.0, 1.5)])
+    cable = good.machine.cables[0]
+    stops = tuple(
+        Stop(on=on, at=at) for on, at in (("frame", cable.exit), ("bar", cable.attachment))
+    )
+    routed = cable.model_copy(update={"route": stops})
+    machine = good.machine.model_copy(update={"cables": (routed, *good.machine.cables[1:])})
+    with pytest.raises(InputError, match="c0 has a route, allowed: cables from exit to attachment"):
+        identify_geometry([replace(good, assumed=machine)])

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from machines import build, changed, entry, general_content
+from machines import build, changed, entry, general_content, pulley_content, route_content
 
 from cspm_model.equilibrium import gravity_wrench
 from cspm_model.kinematics import geometry, rotation
 from cspm_model.motion import Motion
 from cspm_model.parameters import nominal_parameters
+from cspm_msgs_py.errors import InputError
 from cspm_sim.effects import Elements, catalogue
 from cspm_sim.parameters import plant_parameters
 from cspm_sim.plant import Plant
@@ -71,6 +72,46 @@ def test_an_altered_machine_is_one_whose_file_says_so(with_effect, numbers):
         assert a == pytest.approx(b, rel=1e-12, abs=1e-15), name
     assert any((a != b).any() for a, b in zip(found, nominal, strict=True))
     assert len(found.effects) == 0
+
+
+@pytest.mark.parametrize("content", [pulley_content(), route_content()], ids=["pulleys", "routes"])
+def test_pulleys_and_stops_go_with_a_frame_that_is_beside_where_it_seems(content):
+    effect = entry("frame_pose_offset", **OFFSET)
+    found = plant_parameters(build({**content, "effects": [effect]})).cables
+    expected = geometry(nominal_parameters(build(content)).cables, POSE, list(OFFSET.values()))
+    beside = geometry(found, POSE, np.zeros(6))
+    assert beside.lengths == pytest.approx(expected.lengths, abs=1e-12)
+    assert beside.bar == pytest.approx(expected.bar, abs=1e-12)
+
+
+def test_an_end_takes_the_stop_of_its_route_with_it():
+    for effect, at in (("cable_exit_offset", 0), ("cable_attachment_offset", 1)):
+        content = route_content()
+        offset = entry(effect, ["c1"], x=0.01, y=-0.02, z=0.03)
+        found = plant_parameters(build({**content, "effects": [offset]}))
+        place = content["cables"][1]["route"][at]["at"] + np.array([0.01, -0.02, 0.03])
+        expected = build(changed(content, f"cables.1.route.{at}.at", place.tolist()))
+        np.testing.assert_array_equal(found.cables, plant_parameters(expected).cables)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        (
+            "cables.0.route",
+            route_content()["cables"][0]["route"],
+            "c0 has a route, allowed: cables",
+        ),
+        ("cables.0.parts", 2, "c0 has 2 parts, allowed: cables of one part"),
+    ],
+)
+def test_what_is_derived_for_one_span_is_refused_of_several(path, value, message):
+    content = {**general_content(), "effects": [entry("cable_sag", ["c0"], linear_density=0.01)]}
+    plant_parameters(build(content))
+    if path.endswith("route"):
+        content = changed(changed(content, "cables.0.exit", None), "cables.0.attachment", None)
+    with pytest.raises(InputError, match=message):
+        plant_parameters(build(changed(content, path, value)))
 
 
 @pytest.mark.parametrize("effect", [e for e, _ in ALTERED], ids=lambda e: e["effect"])

@@ -233,6 +233,10 @@ def resim_command(bag: Path, json: Path | None, controllers: Sequence[Path] = ()
         found = resimulate(
             bag, lambda now, total: _in_seconds(progress, what, total)(now), controllers
         )
+    for first, last in found.missing_s[:_MOST_GAPS]:
+        say(console, f"not recorded, or not run: {first:g} to {last:g} s of the scenario")
+    if len(found.missing_s) > _MOST_GAPS:
+        say(console, f"and {len(found.missing_s) - _MOST_GAPS} more parts")
     if found.difference is None:
         end = "" if found.cut_ns is None else f", up to {found.cut_ns * 1e-9:g} s, where it was cut"
         say(console, f"identical: all {found.messages} messages, bit for bit{end}")
@@ -240,10 +244,6 @@ def resim_command(bag: Path, json: Path | None, controllers: Sequence[Path] = ()
         say(console, f"different: {found.difference}")
         if not found.same_version:
             say(console, f"the recording was made by version {found.recorded_version}")
-    for first, last in found.missing_s[:_MOST_GAPS]:
-        say(console, f"not recorded, or not run: {first:g} to {last:g} s of the scenario")
-    if len(found.missing_s) > _MOST_GAPS:
-        say(console, f"and {len(found.missing_s) - _MOST_GAPS} more parts")
     if json is not None:
         difference = dataclasses.asdict(found.difference) if found.difference else None
         identical = {"identical": difference is None, "first_difference": difference}

@@ -260,7 +260,13 @@ def test_a_cut_recording_is_reported_recovered_and_repeated(cspm, tmp_path):
     reported = (
         "" if found["cut_at_s"] is None else f", up to {found['cut_at_s']:g} s, where it was cut"
     )
-    assert out.strip() == f"identical: all {found['messages']} messages, bit for bit{reported}"
+    ((first, last),) = found["missing_s"]
+    assert out.strip().splitlines() == [
+        f"not recorded, or not run: {first:g} to {last:g} s of the scenario",
+        f"identical: all {found['messages']} messages, bit for bit{reported}",
+    ]
+    assert 0.0 < first < 0.4
+    assert last == pytest.approx(19.999)
 
 
 def test_a_hole_is_named_with_its_remedy_by_every_command(cspm, refused, tmp_path):
@@ -285,7 +291,7 @@ def test_resim_reports_the_first_difference(cspm, tmp_path, monkeypatch):
     monkeypatch.setattr("cspm_run.resim.read_bundle", lambda *_: reported)
     code, out, err = cspm("resim", "bag", "--json", "resim.json")
     assert (code, err) == (1, "")
-    assert out.strip().startswith("different: /")
+    assert out.strip().splitlines()[-1].startswith("different: /")
     found = json.loads((tmp_path / "resim.json").read_text())
     assert found["identical"] is False
     assert found["first_difference"]["index"] == 0

@@ -16,7 +16,7 @@ from cspm.testbed import as_file
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.new_folder import ScratchFolder
 from cspm_msgs_py.recording.run_record import SIM
-from cspm_run.plants import PLANTS
+from cspm_run.plants import check_plant_name
 
 Variant = Mapping[str, Any]
 
@@ -113,8 +113,7 @@ def _run_of(variant: Variant, kept: tuple[str, ...] | None) -> Run:
         what = f"{', '.join(unknown)}: no setting" if unknown else "scenario: missing"
         raise InputError(f"{what}, allowed: scenario, and of {', '.join(SETTINGS[1:])}")
     plant = variant.get("plant", SIM)
-    if plant not in PLANTS:
-        raise InputError(f"plant {plant}: allowed: {', '.join(PLANTS)}")
+    check_plant_name(plant, "plant")
     duration, seed = variant.get("duration"), variant.get("seed")
     chosen = with_changes(as_scenario(variant["scenario"]), duration=duration, seed=seed)
     reference, testbed = variant.get("reference"), variant.get("testbed")

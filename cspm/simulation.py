@@ -30,7 +30,7 @@ from cspm_run.bundle import Bundle, make_bundle
 from cspm_run.memory_recorder import MemoryRecorder
 from cspm_run.output.json_file import write_json
 from cspm_run.output.summary import summary_data
-from cspm_run.plants import PLANTS, refuse_cuts
+from cspm_run.plants import PLANTS, check_plant_name, check_unit_mode, refuse_cuts
 from cspm_run.recorded_run import (
     INPROCESS,
     metadata,
@@ -197,8 +197,8 @@ def simulate(
         controllers: of one's own, by stage; see `Controller`. In this process only.
         reference: another motion for the bar to follow: a function of time [s] that returns a pose
             x y z φ θ ψ in world_ned [m, rad], or times (n,) and poses (n, 6).
-        plant: whose equations: `sim`, or `mujoco`, a second implementation; in real time also
-            `external`, somebody's drivers.
+        plant: whose equations: `sim`, or `mujoco`, a second implementation; in this process also
+            the file of a unit of FMI 2, in real time also `external`, somebody's drivers.
         mode: `inprocess`, without ROS; `graph`, ROS 2 nodes in one process; `processes`, a process
             per node; these three give the same messages. `realtime`: nodes paced by the clock.
         anyway: in real time with a simulated plant, begin without a look at how late the machine
@@ -252,7 +252,7 @@ def bundle_of(
     Args:
         scenario: as requested.
         testbed: a machine instead of the scenario's.
-        plant: one of `PLANTS`, or `external`.
+        plant: one of `PLANTS`, a unit's file, or `external`.
         own: a folder of motions that the caller wrote, beside the scenario's.
 
     Raises:
@@ -347,8 +347,8 @@ def check_anyway(plant: str, mode: str, option: str = "anyway", *, anyway: bool)
 def _check_choices(plant: str, mode: str, own: bool) -> None:
     if mode not in MODES:
         raise InputError(f"mode {mode}: allowed: {', '.join(MODES)}")
-    if plant not in (*PLANTS, EXTERNAL):
-        raise InputError(f"plant {plant}: allowed: {', '.join((*PLANTS, EXTERNAL))}")
+    check_plant_name(plant, "plant", more=[EXTERNAL])
+    check_unit_mode(plant, mode, "plant", INPROCESS)
     if plant == EXTERNAL and mode != REALTIME:
         raise InputError(f"plant {EXTERNAL} in mode {mode}: allowed: mode {REALTIME}")
     if own and mode != INPROCESS:

@@ -19,6 +19,7 @@ from cspm_run.bundle import Bundle
 from cspm_run.compiled.compiled_loop import TakeBlock
 from cspm_run.controlled_dofs import controlled_dofs
 from cspm_run.loop import Loop
+from cspm_run.plants import recorded_plant
 from cspm_run.recorded_scene import RecordedScene
 from cspm_run.run_result import RunResult
 from cspm_run.run_statistics import RunStatistics
@@ -163,7 +164,7 @@ def metadata(bundle: Bundle, mode: str, own_nodes: Sequence[str] = ()) -> dict[s
         "scenario": bundle.scenario.name,
         "seed": str(bundle.scenario.seed),
         "mode": mode,
-        "plant": bundle.plant,
+        **recorded_plant(bundle.plant),
         "package_version": version("cspm"),
         "testbed": bundle.described.testbed.name,
         "testbed_sha256": bundle.described.sha256,

@@ -30,7 +30,8 @@ class _Listed(typer.core.TyperGroup):
     order = (
         *("demo", "new", "run", "view", "info", "recover", "resim", "data", "check", "import"),
         *("export", "compare", "identify", "diagnose", "bundle", "merge", "campaign", "analyze"),
-        *("doctor", "schema", "migrate", "replay", "check-drivers", "urdf", "mjcf", "node"),
+        *("doctor", "schema", "migrate", "replay", "check-drivers", "urdf", "mjcf"),
+        *("fmu", "node"),
     )
 
     def list_commands(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]

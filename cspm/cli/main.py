@@ -42,6 +42,7 @@ def main() -> None:
     import_module("cspm.cli.ros")
     import_module("cspm.cli.new")
     import_module("cspm.cli.campaign")
+    import_module("cspm.cli.fmu")
     import_module("cspm.cli.installation")
     run_app(app, "cspm")
 
@@ -158,7 +159,8 @@ def run(
         typer.Option(
             metavar="PLANT",
             help="Whose equations to simulate: sim, or mujoco, a second implementation on the"
-            " MuJoCo engine; or external, nobody's: your drivers take the plant's place.",
+            " MuJoCo engine; or those of a file, a unit of FMI 2; or external, nobody's: your"
+            " drivers take the plant's place.",
         ),
     ] = "sim",
     one_process: Annotated[
@@ -283,10 +285,10 @@ def run(
     from cspm.commands.run_command import RunnerOptions, run_command
     from cspm.simulation import check_anyway
     from cspm_msgs_py.recording.run_record import EXTERNAL
-    from cspm_run.plants import PLANTS
+    from cspm_run.plants import check_plant_name, check_unit_mode
 
-    if plant not in (*PLANTS, EXTERNAL):
-        raise InputError(f"--plant {plant}: allowed: {', '.join((*PLANTS, EXTERNAL))}")
+    check_plant_name(plant, "--plant", more=[EXTERNAL])
+    check_unit_mode(plant, mode, "--plant", MODES[0])
     check_anyway(plant, mode, "--anyway", anyway=anyway)
     if view:
         from cspm.commands.run_view_command import WatchRequest, check_watchable, run_view_command

@@ -23,6 +23,7 @@ _SERVES = {
     "tables": "to_pandas, to_xarray",
     "campaign": "cspm campaign",
     "mujoco": "--plant mujoco",
+    "fmu": "cspm fmu, --plant FILE.fmu",
     "view": "cspm view",
 }
 _ROS_SERVES = "--mode graph, processes and realtime; replay, check-drivers, inject"

@@ -11,8 +11,9 @@ RECORD_NAME = "cspm"
 CONTRACT_VERSION = "1"
 # Attachments whose SHA-256 the record has, with its key.
 _SEALED = {"testbed.yaml": "testbed_sha256", "mapping.yaml": "mapping_sha256"}
-# In the plant's place: somebody's drivers, not a simulation.
-SIM, MUJOCO, EXTERNAL = "sim", "mujoco", "external"
+# In the plant's place: a unit of FMI, whose SHA-256 is beside it; somebody's drivers, not a
+# simulation.
+SIM, MUJOCO, FMU, EXTERNAL = "sim", "mujoco", "fmu", "external"
 # The key under which controllers of somebody's own are named: objects, which no recording carries,
 # or files, which one carries and nobody runs unasked.
 OWN_CONTROLLERS = "own_controllers"

@@ -74,6 +74,9 @@ NOT_RUN: dict[str, str] = {
     "cspm import log.": "logs of the reader; tests/cspm_ident/importing/test_actuator_logs.py",
     "cspm identify winch swing": "a log of the reader; tests/cspm_ident/winch",
     "cspm diagnose swing": "a log of the reader; tests/cspm/cli/test_diagnose.py",
+    "cspm fmu": "needs an extra; tests/cspm_sim/fmu",
+    "cspm run calm --plant crane.fmu": "needs an extra; tests/cspm_sim/fmu",
+    "cspm run emps --plant names.yaml": "a unit of the reader; tests/cspm_sim/fmu",
     "cspm mjcf fitted": "a fit of the reader; tests/cspm_model/scene/test_mujoco_joints.py",
     "cspm import my_bag": "a bag of the reader; tests/cspm_ident/importing",
 }

@@ -17,6 +17,7 @@ FITS = ("scipy.optimize", "scipy.stats", "scipy.signal")
 APART = (
     *("plotly", "matplotlib", "control"),
     *("mujoco", "dask", "distributed", "pyarrow", "pandas", "rclpy"),
+    *("fmpy", "pythonfmu"),
 )
 COMMANDS = {
     each.name.removeprefix("cspm.commands.")

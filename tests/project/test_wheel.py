@@ -175,7 +175,7 @@ def test_a_base_installation_knows_what_it_lacks(environment, tmp_path):
     parts = {each["name"]: each for each in found}
     assert parts["python"]["found"].endswith(f" in {environment}")
     assert parts["cspm"]["there"]
-    for extra in ("files", "tables", "campaign", "mujoco"):
+    for extra in ("files", "tables", "campaign", "mujoco", "fmu"):
         assert parts[f"extra {extra}"]["remedy"] == f"`pip install 'cspm[{extra}]'`"
     assert parts["extra view"]["there"]
     assert parts["ros"]["remedy"].startswith("`pip install 'cspm[ros]'`")
@@ -188,6 +188,7 @@ def test_a_base_installation_knows_what_it_lacks(environment, tmp_path):
         ("campaign sweep.yaml", "campaign"),
         ("run calm --mode graph", "ros"),
         ("run calm --plant mujoco --no-record", "mujoco"),
+        ("fmu calm", "fmu"),
         ("import lab.xlsx --mapping emps --testbed emps --dry-run", "files"),
     ],
 )

@@ -1,0 +1,1 @@
+"""Commands that hand plants to other simulators."""

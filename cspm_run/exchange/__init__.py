@@ -1,0 +1,1 @@
+"""Plants as other simulators load them."""

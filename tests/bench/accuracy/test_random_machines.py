@@ -2,11 +2,13 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from bench.accuracy.drawn_machine import drawn_machine
-from bench.accuracy.random_machines import BROKEN, REFUSED, WARNED, WELL, WILD, Outcome, is_wild
-from bench.accuracy.random_machines import table_of as table
+from bench.accuracy.judged_run import is_wild, moving
+from bench.accuracy.quiet_twin import instabilities
+from bench.accuracy.random_machines import VERDICTS, WELL, Outcome, page_of, table_of
 from cspm_msgs_py.scenario import parse_scenario
 from cspm_msgs_py.testbed import parse_testbed
 from cspm_run.assembly import resolve
@@ -44,15 +46,27 @@ def test_wild_is_what_errs_by_more_than_a_share_of_the_machine():
     assert is_wild({"controlled": ["roll"], "errors": errors}, 2.0)
 
 
-def test_the_table_counts_each_verdict():
-    kinds = (WELL, WELL, WARNED, WILD, REFUSED, BROKEN)
-    found = [Outcome(seed, kind, (), {"design": "no"}) for seed, kind in enumerate(kinds)]
-    cells = [list(column.cells) for column in table(found).columns]
-    assert dict(zip(*cells, strict=True)) == {
-        WELL: "2",
-        WARNED: "1",
-        WILD: "1",
-        REFUSED: "1",
-        BROKEN: "1",
-        "analysis refused: design": "6",
-    }
+def test_what_moves_is_faster_than_a_reference_or_grows():
+    time = np.arange(4000) * 1e-3
+    turn = 10.0 + 3.0 * np.sin(2.0 * np.pi * time / 6.0)[:, None]
+    fast = np.sin(2.0 * np.pi * 12.0 * time)[:, None]
+    assert list(moving(time, turn)) == []
+    assert list(moving(time, turn + fast)) == []
+    assert [each[:14] for each in moving(time, turn + 3.0 * fast)] == ["tensions shake"]
+    growing = turn + 0.05 * np.exp(time)[:, None] * fast
+    assert "a motion grows" in " ".join(moving(time, growing))
+
+
+@pytest.mark.slow
+@pytest.mark.compiled
+def test_without_noise_a_stable_machine_neither_shakes_nor_grows(tmp_path):
+    assert instabilities(drawn_machine(REEVED_SMALL), tmp_path / "stable") == ()
+
+
+def test_the_page_counts_each_verdict_and_lists_what_is_not_well():
+    found = [Outcome(seed, kind, ("so",), {}) for seed, kind in enumerate((*VERDICTS, WELL))]
+    assert f"| {WELL} | 2 |" in table_of(found)
+    page = page_of(found, [], range(len(found)))
+    assert all(f"| {kind} | 1 |" in page for kind in VERDICTS[1:])
+    assert f"| 1 | {VERDICTS[1]} | so |" in page
+    assert f"| 0 | {WELL}" not in page

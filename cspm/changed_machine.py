@@ -6,8 +6,9 @@ import re
 from collections.abc import Sequence
 
 from cspm.testbed import Testbed
+from cspm_msgs_py.edited import with_effects
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.testbed import TestbedFile
+from cspm_msgs_py.testbed import EffectEntry, TestbedFile
 from cspm_msgs_py.yaml_file import parse_yaml
 
 # What begins so in `--set` is a key of the test-bed's file, not of the scenario's.
@@ -42,12 +43,23 @@ def changed_machine(
             raise InputError(f"--set {TESTBED}{override}: allowed: {TESTBED}key.path=value")
         value = parse_yaml(text, f"--set {TESTBED}{override}")
         machine = machine.with_parameter(key, value)
-    for effect in effects:
-        machine = _planted(machine, effect)
-    return machine.file
+    return _planted(machine, [(text, _entry(text)) for text in effects]).file
 
 
-def _planted(machine: Testbed, text: str) -> Testbed:
+def _planted(machine: Testbed, effects: Sequence[tuple[str, EffectEntry]]) -> Testbed:
+    """Return the machine with effects, all at once; what is wrong with one is said of that one."""
+    try:
+        return Testbed(with_effects(machine.file, [entry for _, entry in effects]))
+    except InputError:
+        for text, entry in effects:
+            try:
+                machine = Testbed(with_effects(machine.file, [entry]))
+            except InputError as err:
+                raise InputError(f"--effect {text}: {err}") from None
+        raise
+
+
+def _entry(text: str) -> EffectEntry:
     found = _EFFECT.fullmatch(text)
     if found is None:
         raise InputError(f"--effect {text}: allowed: {_FORM}")
@@ -59,7 +71,4 @@ def _planted(machine: Testbed, text: str) -> Testbed:
         except ValueError:
             raise InputError(f"--effect {text}: {pair!r}, allowed: {_FORM}") from None
     elements = [each.strip() for each in (found["elements"] or "").split(",") if each.strip()]
-    try:
-        return machine.with_effect(found["id"], *elements, **numbers)
-    except InputError as err:
-        raise InputError(f"--effect {text}: {err}") from None
+    return EffectEntry(effect=found["id"], elements=tuple(elements), parameters=numbers)

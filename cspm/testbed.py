@@ -117,7 +117,7 @@ class Testbed:
             {'torque': 0.03}
         """
         entry = EffectEntry(effect=effect, elements=elements, parameters=_numbers(parameters))
-        return Testbed(edited.with_effect(self.file, entry))
+        return Testbed(edited.with_effects(self.file, [entry]))
 
     def without_effect(self, effect: str) -> Testbed:
         """Return the test-bed without an effect, on whatever elements it is.

@@ -58,24 +58,26 @@ def with_value(file: TestbedFile, key: str, value: object) -> TestbedFile:
     return _changed(file, lambda content: _put(content, parts, new, key))
 
 
-def with_effect(file: TestbedFile, entry: EffectEntry) -> TestbedFile:
-    """Return the file with a further entry at the end of `effects`.
+def with_effects(file: TestbedFile, entries: Sequence[EffectEntry]) -> TestbedFile:
+    """Return the file with further entries at the end of `effects`.
 
     Raises:
         InputError: the result is no test-bed.
     """
+
+    def add(root: Any) -> None:  # noqa: ANN401 - any YAML
+        own = _own(root, "effects", set())
+        own.extend(_styled(_written(entry), own) for entry in entries)
+
+    return _changed(file, add) if entries else file
+
+
+def _written(entry: EffectEntry) -> dict[str, Any]:
     content: dict[str, Any] = {"effect": entry.effect}
     content |= {"elements": [*entry.elements]} if entry.elements else {}
     table = entry.table
-    content["parameters"] = plain(
-        entry.numbers if table is None else table.model_dump(exclude_defaults=True)
-    )
-
-    def add(root: Any) -> None:  # noqa: ANN401 - any YAML
-        entries = _own(root, "effects", set())
-        entries.append(_styled(content, entries))
-
-    return _changed(file, add)
+    numbers = entry.numbers if table is None else table.model_dump(exclude_defaults=True)
+    return content | {"parameters": plain(numbers)}
 
 
 def without_effect(file: TestbedFile, effect: str) -> TestbedFile:

@@ -33,6 +33,14 @@ def test_without_changes_the_file_is_the_same():
     assert changed_machine(THESIS) == THESIS
 
 
+def test_several_effects_follow_in_their_order_and_the_faulty_one_is_named():
+    bias = "tension_bias@surge_1:bias=0.1"
+    both = changed_machine(THESIS, [], [FRICTION, bias])
+    assert both == changed_machine(changed_machine(THESIS, [], [FRICTION]), [], [bias])
+    with pytest.raises(InputError, match=r"^--effect tension_bias@sway_9:bias=0.1: "):
+        changed_machine(THESIS, [], [FRICTION, "tension_bias@sway_9:bias=0.1", bias])
+
+
 @pytest.mark.parametrize(
     ("overrides", "effects", "text"),
     [

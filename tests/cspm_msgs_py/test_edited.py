@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import THESIS
 
-from cspm_msgs_py.edited import file_of, with_effect, with_value, without_effect
+from cspm_msgs_py.edited import file_of, with_effects, with_value, without_effect
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.testbed import EffectEntry, TestbedFile, load_testbed, parse_testbed
 
@@ -96,13 +96,13 @@ def test_a_law_that_cables_share_changes_for_one(name):
 
 
 def test_an_effect_is_added_and_taken_away():
-    planted = with_effect(FILE, FRICTION)
+    planted = with_effects(FILE, [FRICTION])
     check(planted)
     assert planted.testbed.effects == (*FILE.testbed.effects, FRICTION)
     assert without_effect(planted, FRICTION.effect).testbed == FILE.testbed
     bare = without_effect(FILE, "bar_linear_damping")
     assert bare.testbed.effects == ()
-    assert with_effect(bare, FRICTION).testbed.effects == (FRICTION,)
+    assert with_effects(bare, [FRICTION]).testbed.effects == (FRICTION,)
 
 
 def test_a_description_becomes_a_file(general, rig, point):

@@ -271,3 +271,11 @@ def test_what_is_dumped_is_read_back(content):
 
 def test_dumping_keeps_the_order_of_keys():
     assert dump_yaml({"b": 1, "a": [1, 2]}) == "b: 1\na:\n- 1\n- 2\n"
+
+
+def test_what_is_changed_in_a_content_is_not_there_when_the_text_is_read_again():
+    text = "a: &shared [1, 2]\nb: *shared\n"
+    first = parse_yaml(text, "here")
+    assert first["a"] is first["b"]
+    first["a"].append(3)
+    assert parse_yaml(text, "here") == {"a": [1, 2], "b": [1, 2]}

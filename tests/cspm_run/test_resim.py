@@ -14,7 +14,7 @@ from rosbags.rosbag2.enums import StoragePlugin
 from run_samples import bundle_of
 
 from cspm_msgs_py.diagnostics import hardware_id_of
-from cspm_msgs_py.edited import with_effect
+from cspm_msgs_py.edited import with_effects
 from cspm_msgs_py.errors import InputError
 from cspm_msgs_py.message import carries_row
 from cspm_msgs_py.recording import Recording, recover
@@ -258,7 +258,7 @@ def test_a_planted_effect_travels_with_its_recording(tmp_path):
     entry = EffectEntry(
         effect="winch_coulomb_friction", elements=("sway_3",), parameters={"torque": 0.03}
     )
-    planted = replace(bundle, testbed=with_effect(bundle.testbed, entry))
+    planted = replace(bundle, testbed=with_effects(bundle.testbed, [entry]))
     run(planted, tmp_path / "planted", steps=STEPS)
     with Recording(tmp_path / "planted") as recording:
         attached = attached_testbed(recording.attachments, "planted")

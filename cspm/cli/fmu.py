@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cspm.cli.app import app
+from cspm.cli.app import Json, app
 from cspm_run.library import find_scenario, find_testbed
 
 
@@ -54,6 +54,7 @@ def fmu(
             help="Plant physics in the machine, as for `cspm run`; may be repeated.",
         ),
     ] = None,
+    json: Json = None,
 ) -> None:
     """Write a scenario's plant as an FMU. A unit of FMI 2 for co-simulation.
 
@@ -65,4 +66,4 @@ def fmu(
         find_testbed(str(testbed))
     from cspm.commands.exchange.fmu_command import fmu_command
 
-    fmu_command(path, out, overrides or (), testbed, effects or ())
+    fmu_command(path, out, overrides or (), testbed, effects or (), json)

@@ -14,7 +14,7 @@ from cspm_msgs_py.installed.licence import licence_of
 
 PACKAGE = "cspm"
 # Those that a user asks for; the others serve the source tree.
-EXTRAS = ("ros", "files", "tables", "campaign", "mujoco", "view")
+EXTRAS = ("ros", "files", "benches", "tables", "campaign", "mujoco", "fmu", "view")
 
 
 class Dependency(NamedTuple):

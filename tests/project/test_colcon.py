@@ -15,7 +15,7 @@ from pathlib import Path
 import error_lines
 import pytest
 
-from cspm import graph
+from cspm.cli import node_program
 from cspm_ros.runtime import node_main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -162,7 +162,7 @@ def test_what_ros2_run_starts_is_a_program_that_starts_this_node(name):
     assert text.startswith("#!/usr/bin/env python3\n")
     imported, called = ast.parse(text).body[1:]
     # What a recorder leaves beside a recording is none of the nodes' business.
-    module = graph if name == "recorder" else node_main
+    module = node_program if name == "recorder" else node_main
     assert ast.unparse(imported) == f"from {module.__name__} import {name}"
     assert ast.unparse(called) == f"{name}()"
     assert callable(getattr(module, name))

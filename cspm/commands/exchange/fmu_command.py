@@ -14,6 +14,7 @@ from cspm_msgs_py.new_folder import ScratchFolder, refuse_existing
 from cspm_msgs_py.recording.run_record import SIM
 from cspm_run.bundle import Bundle
 from cspm_run.output.console import make_console, say
+from cspm_run.output.json_file import write_json
 from cspm_sim.fmu.unit import EXTRA
 from cspm_sim.fmu.unit_file import ENDING
 from cspm_sim.fmu.variables import RUN_FOLDER
@@ -36,6 +37,7 @@ def fmu_command(
     overrides: Sequence[str] = (),
     machine: Path | None = None,
     effects: Sequence[str] = (),
+    json: Path | None = None,
 ) -> None:
     """Write the plant of a scenario as a unit of FMI 2 for co-simulation.
 
@@ -45,6 +47,7 @@ def fmu_command(
         overrides: replaced values, `KEY=VALUE`.
         machine: a test-bed file instead of the scenario's.
         effects: physics planted in the machine, as for `cspm run`.
+        json: file for the unit's name; None writes none.
 
     Raises:
         InputError: the scenario cannot be used, the file exists, or PythonFMU is not installed.
@@ -64,6 +67,8 @@ def fmu_command(
             # The builder leaves the script's folder there.
             sys.path[:] = known
     say(make_console(), f"fmu {place}")
+    if json is not None:
+        write_json(json, {"fmu": str(place)})
 
 
 def _resources(bundle: Bundle, folder: Path) -> tuple[Path, Path]:

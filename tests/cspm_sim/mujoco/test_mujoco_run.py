@@ -67,7 +67,10 @@ def test_resim_repeats_it_on_the_plant_that_made_it(monkeypatch, recording):
 
 def test_an_unknown_plant_is_refused(monkeypatch, capsys):
     assert command(monkeypatch, "run", "rest", "--plant", "real", "--no-record") == 2
-    assert said(capsys.readouterr().err) == "--plant real: allowed: sim, mujoco, external\n"
+    assert said(capsys.readouterr().err) == (
+        "--plant real: allowed: sim, mujoco, external, or a file: a unit of FMI 2, or the list of"
+        " names in one\n"
+    )
     bundle = bundle_of("rest")
     with pytest.raises(InputError, match=r"^plant real: allowed: sim, mujoco$"):
         assemble(bundle.scenario, bundle.testbed.testbed, Path(), "real")

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.block_simulation import BlockSimulation, Input, Window
-from cspm_ident.signals.measurement import BAR, FRAME, TENSION, WINCHES, Measurement
-from cspm_ident.signals.noise import noise_above_band, with_more_noise
+from cspm_ident.signals.measurement import BAR, FRAME, SPEED, TENSION, WINCHES, Measurement
+from cspm_ident.signals.noise import with_more_noise
 from cspm_ident.signals.noise_source import noise_of
 from cspm_ident.signals.timeline import Timeline
 from cspm_ident.system.lateness import delays_to_remove
@@ -192,15 +192,13 @@ def make_shooting(
 
 def _noise_of_signals(measurement: Measurement, noise: Mapping[str, Array]) -> dict[str, Array]:
     """Return the noise by attribute of the measurement; `noise` has it by topic."""
-    names = {FRAME: "frame_pose", BAR: "bar_pose", WINCHES: "angle", TENSION: "tension"}
-    found = {
+    names = {FRAME: "frame_pose", BAR: "bar_pose", TENSION: "tension"}
+    names |= {WINCHES: "angle", SPEED: "speed"}
+    return {
         name: noise[topic]
         for topic, name in names.items()
         if topic in noise and getattr(measurement, name) is not None
     }
-    if measurement.speed is not None:
-        found["speed"] = noise_above_band(measurement.speed)
-    return found
 
 
 def _check_band(line: Timeline, noise: Mapping[str, Array], duration: float) -> None:

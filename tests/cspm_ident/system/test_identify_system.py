@@ -61,21 +61,24 @@ def test_what_another_plant_was_given_is_found(result):
 
 @pytest.mark.slow
 def test_a_machine_whose_winches_stand_in_the_world_is_fitted(tmp_path):
-    """A camera on four cables: nothing measures a winch frame, since there is none."""
+    """A platform on six stiff cables: nothing measures a winch frame, since there is none.
+
+    Its winches vibrate, since they are controlled by noisy poses. That is no noise of their speed.
+    """
     pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
-    true = {"bar.mass": 3.3, "bar_damping.surge": 0.8}
-    damping = "{effect: bar_linear_damping, parameters: {surge: 0.8, sway: 0.0, heave: 0.0,"
+    true = {"bar.mass": 33.0, "axial_damping": 1.0, "bar_damping.surge": 9.0}
+    damping = "{effect: bar_linear_damping, parameters: {surge: 9.0, sway: 0.0, heave: 0.0,"
     changes = {
-        "mass: {value: 3.0,": "mass: {value: 3.3,",
+        "mass: {value: 30.0,": "mass: {value: 33.0,",
         "sensors:": f"effects:\n  - {damping} roll: 0.0, pitch: 0.0, yaw: 0.0}}}}\nsensors:",
     }
-    recorded = record_other(tmp_path / "camera", "stadium_camera", "duration=9", changes=changes)
+    recorded = record_other(tmp_path / "crane", "robocrane", "duration=9", changes=changes)
     assert recorded.frame_pose is None
     chosen = choose(recorded.machine, list(true))
     estimate = solve([recorded], chosen, most_windows=1).solution.estimate
     for name, value in true.items():
         low, high = estimate.interval(name)
-        assert low <= value <= high < 1.02 * value, name
+        assert low <= value <= high < 1.05 * value, name
 
 
 @pytest.mark.slow

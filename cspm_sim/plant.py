@@ -161,10 +161,7 @@ class Plant:
         if bad >= 0:
             raise DivergenceError(f"t = {self.time:.3f} s: {self.state_name(bad)} is not finite")
         if self.testbed.bar and abs(self.bar_state[4]) > 0.5 * np.pi:
-            raise DivergenceError(
-                f"t = {self.time:.3f} s: pitch {self.bar_state[4]:.3f} rad passed ±π/2, where the"
-                " Euler angles end"
-            )
+            raise past_vertical(self.time, self.bar_state[4])
         if self.steps in self._cuts:
             self._part()
 
@@ -309,3 +306,10 @@ class Plant:
         frame = np.concatenate([self.frame[:6], np.zeros(12)])
         plant_tensions(self.state, frame, self.parameters, self.scratch, self.outputs)
         return self.tensions.copy()
+
+
+def past_vertical(time: float, pitch: float) -> DivergenceError:
+    """Return the error of a bar whose pitch [rad] left the Euler angles at a time [s]."""
+    return DivergenceError(
+        f"t = {time:.3f} s: pitch {pitch:.3f} rad passed ±π/2, where the Euler angles end"
+    )

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cspm.cli.app import Json, app
+from cspm.cli.shared_options import Effects, Overrides
 from cspm_run.library import find_scenario, find_testbed
 
 
@@ -37,23 +38,8 @@ def fmu(
         Path | None,
         typer.Option(metavar="FILE", help="The machine, instead of the scenario's."),
     ] = None,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Replace a value of the scenario or of its test-bed, as for `cspm run`; may be"
-            " repeated.",
-        ),
-    ] = None,
-    effects: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--effect",
-            metavar="EFFECT",
-            help="Plant physics in the machine, as for `cspm run`; may be repeated.",
-        ),
-    ] = None,
+    overrides: Overrides = None,
+    effects: Effects = None,
     json: Json = None,
 ) -> None:
     """Write a scenario's plant as an FMU. A unit of FMI 2 for co-simulation.

@@ -13,7 +13,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from cspm.cli.app import RUN_FAILED, Json, app, new_folder
-from cspm.cli.shared_options import COMMAND, Browser, Port, add_shared_options
+from cspm.cli.shared_options import COMMAND, Browser, Effects, Overrides, Port, add_shared_options
 from cspm_msgs_py.control_spec.motion_laws import MOTION_LAWS
 from cspm_msgs_py.errors import CspmError, InputError
 from cspm_msgs_py.garbage import look_seldom
@@ -226,26 +226,8 @@ def run(
         ),
     ] = None,
     record: Annotated[bool, typer.Option(help="Whether to record.")] = True,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Replace a value of the scenario, in its units (SI, rad), such as"
-            " target.motion.peak_period=2, or of its test-bed, such as"
-            " testbed.cables.sway_3.drum_radius=0.026; may be repeated.",
-        ),
-    ] = None,
-    effects: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--effect",
-            metavar="EFFECT",
-            help="Plant physics in the machine: EFFECT@ELEMENTS:PARAMETER=VALUE, such as"
-            " winch_coulomb_friction@sway_3:torque=0.02; several elements or parameters by"
-            " commas; may be repeated. `cspm diagnose --explain EFFECT` describes one.",
-        ),
-    ] = None,
+    overrides: Overrides = None,
+    effects: Effects = None,
     laws: Annotated[
         str | None,
         typer.Option(

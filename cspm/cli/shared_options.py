@@ -31,6 +31,26 @@ Browser = Annotated[
         show_default="at a terminal",
     ),
 ]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace a value of the scenario, in its units (SI, rad), such as"
+        " target.motion.peak_period=2, or of its test-bed, such as"
+        " testbed.cables.sway_3.drum_radius=0.026; may be repeated.",
+    ),
+]
+Effects = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--effect",
+        metavar="EFFECT",
+        help="Plant physics in the machine: EFFECT@ELEMENTS:PARAMETER=VALUE, such as"
+        " winch_coulomb_friction@sway_3:torque=0.02; several elements or parameters by"
+        " commas; may be repeated. `cspm diagnose --explain EFFECT` describes one.",
+    ),
+]
 
 _CODES = "Exit code: 0 done, 1 failed, 2 unusable input, 130 interrupted."
 

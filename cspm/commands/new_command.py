@@ -57,7 +57,7 @@ def new_command(
         if path.exists():
             raise InputError(f"{path}: already exists, allowed: a new file, or another name")
     known = known or Accuracies()
-    for option, accuracy in zip(("survey", "mass"), known, strict=True):
+    for option, accuracy in known._asdict().items():
         if accuracy is not None and not 0.0 <= accuracy < np.inf:
             raise InputError(f"--{option}-accuracy {accuracy:g}: allowed: 0 or more")
     planned = layout(kind, size)

@@ -38,7 +38,7 @@ from cspm_run.stage_warm_up import compile_beside
 if TYPE_CHECKING:
     from cspm_ros.margins.rehearsal import Variant
 
-# So many parts of a run that are missing are told.
+# So many missing parts of a run are printed.
 _MOST_GAPS = 3
 
 

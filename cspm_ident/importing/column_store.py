@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from copy import copy
 from mmap import MADV_DONTNEED, mmap
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from typing_extensions import Self
 
 from cspm_msgs_py.new_folder import ScratchFolder
+from cspm_msgs_py.recording.closing import Closing
 
 Array = NDArray[Any]
 PIECE = 200_000
@@ -37,7 +36,7 @@ def release(*columns: Array) -> None:
             owner.madvise(MADV_DONTNEED)
 
 
-class ColumnStore:
+class ColumnStore(Closing):
     """Arrays that grow by pieces and are read back as if they were in memory.
 
     Leaving the context removes what was stored.
@@ -94,13 +93,6 @@ class ColumnStore:
             return np.zeros(0, dtype=self._kinds.get(name, np.dtype(np.float64)))
         return np.memmap(self._paths[name], dtype=self._kinds[name], mode="r")
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Remove what was stored."""
         self._folder.close()

@@ -29,7 +29,6 @@ ROUTE_COLUMNS = FIRST_STOP + STOP_COLUMNS * MOST_STOPS
 # Columns of a stop that is placed, world axes: its centre, where the cable touches it first, and
 # where last [m].
 _CENTRE, _FIRST, _LAST, _PLACED = 0, 3, 6, 9
-# Callers without numba's runtime pass that on to what they compile, so what allocates asks for it.
 # A sweep leaves of an error the product of radius over distance of neighbouring pulleys.
 _SWEEPS, _STILL = 60, 1e-14
 
@@ -140,7 +139,8 @@ def _leave(placed: Array, axis: Vector, radius: float) -> tuple[float, float]:
     return length, moved
 
 
-@njit(cache=True, error_model="numpy", _nrt=True)  # allocates
+# Callers without numba's runtime pass that on to what they compile, so what allocates asks for it.
+@njit(cache=True, error_model="numpy", _nrt=True)
 def _place(
     leaves: Vector, attachment: Vector, route: Array, frame: Placement, body: Placement
 ) -> Array:
@@ -165,7 +165,7 @@ def _place(
     return placed
 
 
-@njit(cache=True, error_model="numpy", _nrt=True)  # allocates
+@njit(cache=True, error_model="numpy", _nrt=True)  # as `_place`
 def along_route(
     leaves: Vector,
     axis: Vector,

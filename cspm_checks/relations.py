@@ -86,7 +86,7 @@ def _torque_relations(
     if cells is not None:
         measured = series_of(cells, f"effort/{cable.name}", origin_ns)
         tension = measured if len(measured.values) else None
-    radius = cable.drum_radius / cable.gear_ratio
+    radius = cable.wound_radius
     if "position" not in state.topic.parts:
         return [] if tension is None else torque_suspicions(where, torque, tension, radius)
     angle = series_of(state, f"position/{cable.name}", origin_ns)

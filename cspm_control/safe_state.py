@@ -58,7 +58,7 @@ class Hold:
             ramp_time: from the tensions measured last to these [s].
         """
         cables = testbed.cables
-        self._radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
+        self._radii = np.array([cable.wound_radius for cable in cables])
         limits = np.array([cable.torque_limit for cable in cables])
         self._lowest, self._highest = -limits, limits
         share = 0.0

@@ -52,7 +52,7 @@ def _cable_row(cable: Cable, gravity: float) -> tuple[Array, Array]:
     table = np.zeros((POINTS, 2))
     row[cable_kernel.GEAR_RATIO] = cable.gear_ratio
     row[cable_kernel.GRAVITY_HERE] = gravity
-    row[cable_kernel.RADIUS] = cable.drum_radius / cable.gear_ratio
+    row[cable_kernel.RADIUS] = cable.wound_radius
     row[cable_kernel.INERTIA] = cable.rotor_inertia
     row[cable_kernel.TORQUE_LIMIT] = cable.torque_limit
     row[cable_kernel.PARTS] = cable.parts

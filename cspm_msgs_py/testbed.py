@@ -234,6 +234,11 @@ class Cable(StrictModel):
         return self.exit is not None
 
     @property
+    def wound_radius(self) -> float:
+        """Cable that a radian of the motor winds [m]."""
+        return self.drum_radius / self.gear_ratio
+
+    @property
     def is_straight(self) -> bool:
         """Whether the cable is one straight line from exit to attachment."""
         if self.route is not None:

@@ -301,7 +301,7 @@ def _start_tensions(testbed: Testbed, control: Control) -> Array | None:
     if not isinstance(control, TorqueProfile):
         return None
     first = TorqueGenerator(control.torque, testbed.cable_names).step(0)
-    radii = np.array([cable.drum_radius / cable.gear_ratio for cable in testbed.cables])
+    radii = np.array([cable.wound_radius for cable in testbed.cables])
     has_cable = np.array([cable.has_cable for cable in testbed.cables])
     tensions: Array = np.maximum(0.0, first / radii) * has_cable
     return tensions

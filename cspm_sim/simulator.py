@@ -81,7 +81,7 @@ class Simulator:
         # Where there is no cable nothing is slack.
         self.slack_limit = np.array([0.0 if cable.has_cable else -1.0 for cable in cables])
         # Before anything is commanded the winches hold what hangs on them.
-        radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
+        radii = np.array([cable.wound_radius for cable in cables])
         self.torque: Array = radii * plant.tensions
         self._clock = publish.get(CLOCK)
         self.truth = Truth(plant, target)

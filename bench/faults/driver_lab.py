@@ -79,7 +79,7 @@ class DriverLab:
             parts.plant, parts.sensors, {}, period_ns=parts.period_ns, controlled=True
         )
         cables = self.testbed.cables
-        self._radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
+        self._radii = np.array([cable.wound_radius for cable in cables])
         self._limits = np.array([c.tension_limits[1] if c.tension_limits else 1.0 for c in cables])
         self._angles, self._bar = parts.plant.angles.copy(), parts.plant.bar_state[:3].copy()
         self._hold = Hold(self.testbed, parts.plant.tensions.copy(), 0.5)

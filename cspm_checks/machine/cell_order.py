@@ -103,7 +103,7 @@ def _drives(log: Log, testbed: Testbed, origin_ns: int) -> tuple[list[_Drive], l
     for cable in chosen:
         angle = series_of(state, f"position/{cable.name}", origin_ns)
         torque = series_of(state, f"effort/{cable.name}", origin_ns)
-        drive = _drive(angle, torque, tensions, cable.drum_radius / cable.gear_ratio)
+        drive = _drive(angle, torque, tensions, cable.wound_radius)
         if drive is None:
             return [], []
         found.append(drive)

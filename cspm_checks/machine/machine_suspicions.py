@@ -53,7 +53,7 @@ def _late_cells(log: Log, testbed: Testbed, origin_ns: int) -> list[Suspicion]:
     pulls = [series_of(cells, f"effort/{name}", origin_ns) for name in names]
     if not names or any(len(one.time) < 3 for one in (*torques, *pulls)):
         return []
-    radii = {each.name: each.drum_radius / each.gear_ratio for each in testbed.cables}
+    radii = {each.name: each.wound_radius for each in testbed.cables}
     mine, ours = _table(pulls), _table(torques)
     scale = np.array([radii[name] for name in names])
     found = coarse_shift(pulls[0].time, mine * scale, torques[0].time, ours)

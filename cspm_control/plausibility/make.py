@@ -272,7 +272,7 @@ def drive_motion(scenario: Scenario, testbed: Testbed, period_ns: int) -> DriveM
     cables, trips = testbed.cables, tension_trips(scenario, testbed)
     # What has no limit carries no bar, and nothing pulls at it.
     tensions = np.where(np.isfinite(trips), trips, 0.0)
-    radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
+    radii = np.array([cable.wound_radius for cable in cables])
     torques = np.array([cable.torque_limit for cable in cables]) + radii * tensions
     accelerations = torques / np.array([cable.rotor_inertia for cable in cables])
     noise = (0.0, 0.0)
@@ -288,7 +288,7 @@ def torque_balance(scenario: Scenario, testbed: Testbed) -> TorqueBalance:
     allowed = [wanted or TORQUE_SHARE * cable.torque_limit for cable in cables]
     return TorqueBalance(
         testbed.cable_names,
-        np.array([cable.drum_radius / cable.gear_ratio for cable in cables]),
+        np.array([cable.wound_radius for cable in cables]),
         np.array([cable.rotor_inertia for cable in cables]),
         np.array(allowed),
         np.array([cable.has_cable for cable in cables]),

@@ -362,7 +362,7 @@ def torque_stage(control: TorqueProfile, scenario: Scenario, testbed: Testbed) -
     """Return the prescribed torques, one for each of the plant's periods."""
     return TorqueStage(
         TorqueGenerator(control.torque, testbed.cable_names),
-        np.array([cable.drum_radius / cable.gear_ratio for cable in testbed.cables]),
+        np.array([cable.wound_radius for cable in testbed.cables]),
         make_safe_state(scenario, testbed),
         scenario.safety,
         1_000_000_000 // scenario.rates.plant,
@@ -384,7 +384,7 @@ def angle_stage(control: AngleProfile, scenario: Scenario, testbed: Testbed) -> 
             control.bandwidth,
             period=1.0 / rate,
         ),
-        np.array([cable.drum_radius / cable.gear_ratio for cable in cables]),
+        np.array([cable.wound_radius for cable in cables]),
         tension_trips(scenario, testbed),
         testbed.cable_names,
         make_safe_state(scenario, testbed),

@@ -142,7 +142,7 @@ def _tension_lost(measurement: Measurement, effect: Effect, i: int) -> Array:
     rows[:, WinchSignal.ANGLE] = angle.values[:, i]
     rows[:, WinchSignal.SPEED] = speed.values[:, i]
     rows[:, WinchSignal.TENSION] = tension.values[:, i]
-    rows[:, WinchSignal.RADIUS] = winch.drum_radius / winch.gear_ratio
+    rows[:, WinchSignal.RADIUS] = winch.wound_radius
     rows[:, WinchSignal.GEAR] = winch.gear_ratio
     shape = dict(next(shapes_of(effect)))
     torque = effect.regressors(rows, **shape)[:, 0]

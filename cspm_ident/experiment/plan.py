@@ -162,7 +162,7 @@ def _measured(
     machine = testbed.testbed
     speeds = np.gradient(angles, STEP_S, axis=0)
     inertia = np.array([cable.rotor_inertia for cable in machine.cables])
-    radius = np.array([cable.drum_radius / cable.gear_ratio for cable in machine.cables])
+    radius = np.array([cable.wound_radius for cable in machine.cables])
     torques = inertia * np.gradient(speeds, STEP_S, axis=0) + radius * tensions
     has_cable = any(cable.has_cable for cable in machine.cables)
     return Measurement(

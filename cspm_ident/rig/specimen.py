@@ -154,7 +154,7 @@ def _specimen(
             " test-bed's cables"
         )
     winch, cell = (group.index(cable.name) for group in names)
-    radius = cable.drum_radius / cable.gear_ratio
+    radius = cable.wound_radius
     angle = _at(time, rows[WINCHES], winch)
     return Specimen(
         label=cable.name,

@@ -106,7 +106,7 @@ def winch_signals(measurement: Measurement, cable: str, torque_age: float = 0.0)
         angle.column(index),
         torque.column(index),
         _pulling(measurement, index),
-        description.drum_radius / description.gear_ratio,
+        description.wound_radius,
         description.gear_ratio,
         torque_age,
         load=tuple(load_effects(description, machine.gravity)),

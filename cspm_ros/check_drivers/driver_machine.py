@@ -171,7 +171,7 @@ def _lengths(testbed: Testbed, shape: Geometry, winches: Heard) -> list[Finding]
 
 
 def _radius(cable: Cable) -> float:
-    return cable.drum_radius / cable.gear_ratio
+    return cable.wound_radius
 
 
 def _with_drum(cable: Cable, units: Mapping[float, str], power: int) -> dict[float, str]:

@@ -46,7 +46,7 @@ class DriverProof:
         self._slowest_hz = min(float(getattr(rates, RATE_OF_SENSOR[name])) for name in needed)
         self._testbed, self.topics, self._drive = testbed, tuple(needed), drive
         cables = testbed.cables
-        self._radii = np.array([each.drum_radius / each.gear_ratio for each in cables])
+        self._radii = np.array([each.wound_radius for each in cables])
         self._readers = {name: WireReader(testbed.topics[name]) for name in needed}
         self._rows: dict[str, deque[Array]] = defaultdict(lambda: deque(maxlen=_ROWS))
         # A command answers both what turns and what pulls.

@@ -27,7 +27,7 @@ def constant_at_rest(testbed: Testbed, heard: Mapping[str, Heard]) -> frozenset[
     angles = winches.part("position") if winches else None
     if angles is None:
         return frozenset()
-    radii = np.array([cable.drum_radius / cable.gear_ratio for cable in testbed.cables])
+    radii = np.array([cable.wound_radius for cable in testbed.cables])
     moved = [np.ptp(angles, axis=0) * radii]
     poses = [heard[name] for name in (BAR_POSE, FRAME_POSE) if name in heard]
     moved += [np.ptp(pose.values[:, :3], axis=0) for pose in poses]

@@ -157,7 +157,7 @@ def _answer(testbed: Testbed, signal: _Signal, before: Window, during: Window) -
     rows = [each for each in windows if each is not None and len(each) >= FEWEST_ROWS]
     if len(rows) < 2:
         return None
-    radii = np.array([cable.drum_radius / cable.gear_ratio for cable in testbed.cables])
+    radii = np.array([cable.wound_radius for cable in testbed.cables])
     scale = {"tension": np.ones_like(radii), "angle": -radii, "torque": 1.0 / radii}[signal.name]
     columns = slice(signal.place * len(radii), (signal.place + 1) * len(radii))
     rest, pulled = (scale * each[:, columns] for each in rows)

@@ -54,7 +54,7 @@ def judge_wiggle(testbed: Testbed, plateaus: Mapping[Plateau, Means]) -> list[Fi
         testbed: the machine.
         plateaus: both of each winch.
     """
-    radii = np.array([cable.drum_radius / cable.gear_ratio for cable in testbed.cables])
+    radii = np.array([cable.wound_radius for cable in testbed.cables])
     names = testbed.cable_names
     shown = [(plateaus[Plateau(i, 1.0)], plateaus[Plateau(i, -1.0)]) for i in range(len(names))]
     findings = []

@@ -65,7 +65,7 @@ class WinchWiggle:
         self._names = testbed.cable_names
         self._hold = Hold(testbed, tensions, 0.0)
         self._hold.begin(tensions)
-        self._radii = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
+        self._radii = np.array([cable.wound_radius for cable in cables])
         self._most = np.array([cable.torque_limit for cable in cables])
         highest = np.array([c.tension_limits[1] if c.tension_limits else 0.0 for c in cables])
         more, less = MORE_SHARE * (highest - tensions), LESS_SHARE * tensions

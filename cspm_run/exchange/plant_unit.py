@@ -54,7 +54,7 @@ class PlantUnit(Fmi2Slave):  # type: ignore[misc] # PythonFMU has no types
         self.description = f"{testbed.name}, in the scenario {scenario.name}"
         self._period = 1.0 / scenario.rates.plant
         self.default_experiment = DefaultExperiment(0.0, scenario.duration, self._period)
-        radii = np.array([cable.drum_radius / cable.gear_ratio for cable in testbed.cables])
+        radii = np.array([cable.wound_radius for cable in testbed.cables])
         self._torque = radii * self._plant.tensions
         self._twist = np.zeros(6)
         self._register()

@@ -22,7 +22,7 @@ def load_effects(cable: Cable, gravity: float) -> Iterator[tuple[Effect, dict[st
     load, known = cable.load, catalogue()
     if load is None:
         return
-    radius = cable.drum_radius / cable.gear_ratio
+    radius = cable.wound_radius
     if load.mass is not None:
         yield known["winch_torque_offset"], {"torque": -load.mass * gravity * radius}
         yield known["winch_inertia"], {"inertia": load.mass * radius**2}

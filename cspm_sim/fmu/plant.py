@@ -22,7 +22,7 @@ from cspm_sim.fmu.variables import (
     TWIST,
     names_of,
 )
-from cspm_sim.plant import Plant
+from cspm_sim.plant import Plant, past_vertical
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class FmuPlant:
         self.tensions = rest.tensions.copy()
         self.unstretched_lengths = rest.unstretched_lengths.copy()
         cables = self.testbed.cables
-        self._wound = np.array([cable.drum_radius / cable.gear_ratio for cable in cables])
+        self._wound = np.array([cable.wound_radius for cable in cables])
         self._limits = np.array([cable.torque_limit for cable in cables])
         self._find_places()
         self._locked = False
@@ -190,14 +190,11 @@ class FmuPlant:
         state[9:12] = rotate_back(rotation, twist[3], twist[4], twist[5])
 
     def _check(self) -> None:
-        told = (self.bar_state, self.angles, self.speeds, self.tensions)
-        if not all(np.isfinite(each).all() for each in told):
+        read = (self.bar_state, self.angles, self.speeds, self.tensions)
+        if not all(np.isfinite(each).all() for each in read):
             raise DivergenceError(f"t = {self.time:.3f} s: {self._unit.path.name} is not finite")
         if self.testbed.bar and abs(self.bar_state[4]) > 0.5 * np.pi:
-            raise DivergenceError(
-                f"t = {self.time:.3f} s: pitch {self.bar_state[4]:.3f} rad passed ±π/2, where the"
-                " Euler angles end"
-            )
+            raise past_vertical(self.time, self.bar_state[4])
         if self._frame is None:
             return
         apart = np.abs(self._unit.read(self._frame) - self.frame[:6]).max()

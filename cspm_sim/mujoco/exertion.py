@@ -19,7 +19,7 @@ RUNAWAY = 1e6  # no cable carries this [N]
 
 def cable_row(cable: Cable) -> list[float]:
     """Return a cable's numbers in the order of the columns; zeros for a winch without cable."""
-    radius = cable.drum_radius / cable.gear_ratio
+    radius = cable.wound_radius
     if cable.stiffness is None or cable.damping is None:
         return [0.0] * LAW_COLUMNS + [0.0, 0.0, 0.0, radius, 0.0]
     damping = cable.damping

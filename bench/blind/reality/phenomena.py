@@ -35,7 +35,7 @@ LOOSENING_ONSET = 12.0  # [s]
 
 def shaft_radii(machine: Testbed) -> Array:
     """Return the length wound per motor angle, (n,) [m/rad]."""
-    return np.array([c.drum_radius / c.gear_ratio for c in machine.cables])
+    return np.array([c.wound_radius for c in machine.cables])
 
 
 def _ratios(machine: Testbed) -> Array:

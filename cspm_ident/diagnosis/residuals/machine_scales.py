@@ -135,7 +135,7 @@ def _speed(angle: Samples | None) -> float:
 
 def _pulled(measurement: Measurement) -> float:
     """Return the force of the torques at the drums, where there are no load cells."""
-    radii = [cable.drum_radius / cable.gear_ratio for cable in measurement.machine.cables]
+    radii = [cable.wound_radius for cable in measurement.machine.cables]
     return _size(measurement.torque) / max(radii)
 
 

@@ -213,7 +213,7 @@ def _rows(cable: Cable, times: Array, angles: Array, speeds: Array, acceleration
     rows[:, WinchSignal.TIME], rows[:, WinchSignal.GEAR] = times, cable.gear_ratio
     rows[:, WinchSignal.ANGLE], rows[:, WinchSignal.SPEED] = angles, speeds
     rows[:, WinchSignal.ACCELERATION] = accelerations
-    rows[:, WinchSignal.RADIUS] = cable.drum_radius / cable.gear_ratio
+    rows[:, WinchSignal.RADIUS] = cable.wound_radius
     return rows
 
 

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_msgs_py.errors import InputError
+from cspm_msgs_py.schedule import WINCH_STATE
+from cspm_msgs_py.sensor_spec import JOINT_QUANTITIES
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effect_entries import Action, read_actions
 from cspm_sim.effects import Elements
@@ -28,13 +30,15 @@ class SensorFault:
         sense = self.action.effect.physics.sense
         return sense is not None and sense.lateness is not None
 
-    @property
-    def read(self) -> slice:
-        """The columns of the sensor's quantities that it acts on."""
-        alone = self.action.effect.acts_on is Elements.CELLS
-        if not alone or self.action.name == Elements.CELLS.value:
+    def read(self, width: int) -> slice:
+        """Return the columns of the sensor's `width` quantities that it acts on."""
+        effect, i = self.action.effect, self.action.element
+        if effect.physics.sense and effect.physics.sense.quantity:
+            # Angles, speeds and torques, each of all winches.
+            i += width - width // len(JOINT_QUANTITIES[WINCH_STATE])
+        elif effect.acts_on is not Elements.CELLS or self.action.name == Elements.CELLS.value:
             return slice(None)
-        return slice(self.action.element, self.action.element + 1)
+        return slice(i, i + 1)
 
     def lateness(self, time: float) -> float:
         """Return by how much a reading stamped `time` [s] is older than that [s]."""
@@ -104,20 +108,20 @@ class LowPass:
 
     def __init__(self, fault: SensorFault) -> None:
         """Take the fault, whose time constant is above 0."""
-        self._read, self._time_constant = fault.read, fault.time_constant
+        self._fault, self._time_constant = fault, fault.time_constant
         self._before: tuple[float, Array, Array] | None = None
 
     def passed(self, time: float, values: Array) -> Array:
         """Return the quantities of the present [s], later than all before, as they pass."""
-        out = values.copy()
+        out, read = values.copy(), self._fault.read(len(values))
         if self._before is not None:
             then, given, lagging = self._before
             step, slow = time - then, self._time_constant
-            behind = slow * (values - given)[self._read] / step
+            behind = slow * (values - given)[read] / step
             kept = np.exp(-step / slow)
-            rest = lagging - given[self._read] + behind
-            out[self._read] = values[self._read] - behind + rest * kept
-        self._before = time, values.copy(), out[self._read].copy()
+            rest = lagging - given[read] + behind
+            out[read] = values[read] - behind + rest * kept
+        self._before = time, values.copy(), out[read].copy()
         return out
 
 

@@ -126,7 +126,7 @@ class SensorModel:
         if self._past is not None:
             times = np.full(len(values), time)
             for fault in self._faults:
-                times[fault.read] -= fault.lateness(time)
+                times[fault.read(len(values))] -= fault.lateness(time)
             values = self._past.at(times)
         read = values
         for fault in self._faults:

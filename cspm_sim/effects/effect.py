@@ -135,6 +135,7 @@ class Sense:
             pass before anything else [s].
         added: `added(time, values, element, parameters)`: what the element's reading has too much
             at a time since the run's start [s] where the sensor's quantities are `values`.
+        quantity: which of a joint's quantities it acts on, `torque`; empty: the first, or all.
         one_system: whether one system reads all elements, so that what it does to one it is likely
             to do to all.
     """
@@ -144,6 +145,7 @@ class Sense:
     lateness: Callable[[float, Array], float] | None = None
     time_constant: Callable[[Array], float] | None = None
     added: Callable[[float, Array, int, Array], float] | None = None
+    quantity: str = ""
     one_system: bool = False
 
 

@@ -55,7 +55,7 @@ def of_shafts(
         safe = {c: (w, np.hypot(half, w - plain[c][0])) for c, (w, half) in calm.items()}
         whole = _fitted(rows, own, block_s, thresholds)
         agree = all(np.all(np.abs(whole[c][0] - safe[c][0]) <= safe[c][1]) for c in own)
-        found |= whole if agree else safe
+        found |= {} if agree else safe
     return found
 
 

@@ -263,7 +263,7 @@ class _Stretch:
     def _changes(self, effect: Effect) -> Iterator[tuple[Candidate, Place, Array]]:
         bodies = (BAR, FRAME) if self._machine.winch_frame else (BAR,)
         for i, name in enumerate(elements_of(effect, self._machine.cable_names, bodies)):
-            if effect.physics.sense is not None:
+            if effect.signature.regression.channel is Channel.READING:
                 for place, found in self._read(effect, i, name):
                     yield Candidate(effect, name), place, found
                 continue

@@ -119,7 +119,7 @@ def _true_readings(measurement: Measurement, action: Action) -> Measurement:
     effect = action.effect
     assert effect.physics.sense is not None
     topic = effect.physics.sense.topics[0]
-    joints = {TENSION: "tension", WINCHES: "angle"}
+    joints = {TENSION: "tension", WINCHES: effect.physics.sense.quantity or "angle"}
     if topic in joints and effect.physics.sense.lateness is None:
         return _true_joint(measurement, action, joints[topic])
     poses = {BAR: "bar_pose", FRAME: "frame_pose"}
@@ -132,18 +132,27 @@ def _true_readings(measurement: Measurement, action: Action) -> Measurement:
         late = np.array(
             [effect.physics.sense.lateness(float(t), parameters) for t in samples.times]
         )
-        if action.name in measurement.machine.cable_names:
-            values, i = samples.values.copy(), action.element
-            reading = CubicSpline(samples.times, values[:, i], extrapolate=False)
-            there = np.clip(samples.times + late, samples.times[0], samples.times[-1])
-            values[:, i] = reading(there)
-            return measurement.with_samples(kind, Samples(samples.times, values))
-        return measurement.with_samples(kind, Samples(samples.times - late, samples.values))
+        alone = action.name in measurement.machine.cable_names and samples.values.shape[1] > 1
+        there = _earlier(samples, late, action.element) if alone else _stamped(samples, late)
+        return measurement.with_samples(kind, there)
     values, weights = samples.values, effect.weights(action.values)
     for _ in range(_FIXED_POINTS):
         rows = pose_rows(samples.times, values, np.zeros_like(values))
         values = samples.values - effect.regressors(rows) @ weights
     return measurement.with_samples(kind, Samples(samples.times, values))
+
+
+def _stamped(samples: Samples, late: Array) -> Samples:
+    """Return all readings with the stamps of what they show; `late` is of each, (k,) [s]."""
+    return Samples(samples.times - late, samples.values)
+
+
+def _earlier(samples: Samples, late: Array, i: int) -> Samples:
+    """Return column i as it was at the stamps, where readings are late; `late` is of each, (k,)."""
+    values = samples.values.copy()
+    reading = CubicSpline(samples.times, values[:, i], extrapolate=False)
+    values[:, i] = reading(np.clip(samples.times + late, samples.times[0], samples.times[-1]))
+    return Samples(samples.times, values)
 
 
 def _true_joint(measurement: Measurement, action: Action, kind: str) -> Measurement:

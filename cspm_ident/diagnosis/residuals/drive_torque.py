@@ -110,10 +110,11 @@ def _equation(
     place = Place(Channel.DRIVE, name)
     found: dict[Candidate | Driver, Array] = {
         Candidate(effect, name, shape): weigh(
-            window, effect.regressors(rows, **dict(shape))[:, 0], stride
+            window, regression.columns(rows, **dict(shape))[:, 0], stride
         )[:, None, :]
         for effect in effects
-        if effect.signature.regression.channel is Channel.DRIVE
+        for regression in (effect.signature.regression, *effect.signature.partners)
+        if regression.channel is Channel.DRIVE
         for shape in shapes_of(effect)
     }
     signals = {key: weigh(window, rows[:, c], stride) for key, c in _DRIVERS.items()}

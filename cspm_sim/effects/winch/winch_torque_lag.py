@@ -51,7 +51,7 @@ EFFECT = Effect(
         noun="a lag of its drive",
         equation="time_constant·d(reported torque)/dt = commanded torque − reported torque",
         shows="commanded less reported torque is in proportion to the rate of the reported one",
-        confounded_with=("winch_inertia", "pose_delay"),
+        confounded_with=("winch_inertia", "pose_delay", "torque_delay"),
         separating_experiment="torque steps with the winch locked, and a sweep of frequencies",
         reference="Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems, chapter 3",
     ),

@@ -41,6 +41,7 @@ EFFECT = Effect(
             "winch_stribeck_friction",
             "cable_axial_damping",
             "tension_delay",
+            "torque_delay",
             "tension_lag",
             "winch_directional_friction",
             "winch_curved_friction",

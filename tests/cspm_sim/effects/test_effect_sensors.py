@@ -159,6 +159,16 @@ def test_one_late_load_cell_leaves_the_others_in_time():
     assert rows[30_000_000] == pytest.approx(expected, abs=1e-12)
 
 
+def test_a_late_torque_leaves_angle_and_speed_of_its_winch_in_time():
+    testbed = machine(entry("torque_delay", ["c1"], delay=0.0035))
+    values = np.outer(1e-3 * np.arange(40), np.ones(24))
+    rows = readings(sensor(testbed, "/winches/state"), values)
+    expected = [0.0265 if i == 17 else 0.03 for i in range(24)]
+    assert rows[30_000_000] == pytest.approx(expected, abs=1e-12)
+    with pytest.raises(InputError, match="newer than their stamps cannot be simulated"):
+        sensor_faults(machine(entry("torque_delay", ["c1"], delay=-0.002)), "/winches/state")
+
+
 @pytest.mark.parametrize(("elements", "slow"), [(["load_cells"], range(8)), (["c1"], [1])])
 def test_a_low_pass_follows_a_ramp_late_and_a_sine_smaller(elements, slow):
     constant, times = 0.01, 1e-3 * np.arange(1001)

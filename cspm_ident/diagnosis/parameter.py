@@ -69,7 +69,13 @@ def parameters_of(own: Coefficients) -> list[Parameter]:
     upper = -np.inf if own.upper_ends is None else own.upper_ends
     ends = _ends(own.candidate, weights, weights - widths, np.maximum(weights + widths, upper))
     return [
-        _parameter(element, p, values[p.name], max(p.minimum, low), min(p.maximum, high))
+        _parameter(
+            element,
+            p,
+            values[p.name],
+            min(values[p.name], max(p.minimum, low)),
+            max(values[p.name], min(p.maximum, high)),
+        )
         for p, (low, high) in zip(effect.parameters, ends, strict=True)
     ]
 

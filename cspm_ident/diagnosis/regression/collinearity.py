@@ -57,7 +57,8 @@ def distance(
     worse = paired(worse)
     apart = max(0.0, behind(worse))
     if worse.sum() < undecided:
-        apart = min(apart, thresholds.tie_sigma) * max(0.0, worse.sum() / undecided)
+        share = worse.sum() / undecided if worse.sum() > 0.0 else 0.0
+        apart = min(apart, thresholds.tie_sigma) * share
     pairs = min(len(worse), thresholds.block_count // 2)
     return float(np.hypot(apart, np.sqrt(wider * np.log(pairs))))
 

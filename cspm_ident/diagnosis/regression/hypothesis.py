@@ -198,7 +198,7 @@ def is_allowed(candidate: Candidate, weights: Array) -> bool:
     """
     effect = candidate.effect
     steps = np.where(factors_of(effect), np.expm1(np.minimum(weights, _LARGEST)), weights)
-    inverse = effect.signature.rescales & (weights < 1.0)
+    inverse = effect.signature.rescales & (weights < 1.0) & np.isfinite(weights)
     gains = np.divide(weights, 1.0 - weights, out=weights.copy(), where=inverse)
     for each in (weights, steps, gains):
         values = effect.values(each.tolist(), **candidate.nonlinear)

@@ -131,7 +131,7 @@ def _name(effect: Effect, number: Parameter) -> str:
     """Return a parameter's name, marked where it is an offset from the file's value."""
     (absent,) = (p.absent for p in effect.parameters if p.name == number.name)
     less = is_less(effect.id, {number.name: number.value})
-    added = less or (effect.physics.alter is not None and absent == 0.0)
+    added = absent == 0.0 and (less or effect.physics.alter is not None)
     return f"{number.name.replace('_', ' ')}{' off by' if added else ''}"
 
 

@@ -135,16 +135,17 @@ def _moments(
     basis = None if wanted is None else _basis(_at(wanted, equation.times[thin]))
     home = (equation.times[thin] / block_s).astype(int)
     others = [c for c in weights if c in equation.columns and c not in own]
+    # What every machine has is known better than data that resemble the finding tell.
+    small = [c for c in others if c.effect.is_negligible(c.effect.values(weights[c].tolist()))]
     for k in range(equation.target.shape[1]):
         effect = sum((equation.columns[c][thin, k] @ weights[c] for c in mine), np.zeros(len(home)))
-        beside = [equation.columns[c][thin, k] for c in others]
+        beside = [equation.columns[c][thin, k] for c in others if c not in small]
         if equation.nuisance.size:
             beside.append(equation.nuisance[thin, k])
         taken = _basis(np.concatenate([np.zeros((len(home), 0)), *beside], axis=1))
-        left, effect = (
-            each - taken @ (taken.T @ each)
-            for each in (np.asarray(equation.target[thin, k], dtype=float), effect)
-        )
+        left = np.asarray(equation.target[thin, k], dtype=float)
+        left = left - sum(equation.columns[c][thin, k] @ weights[c] for c in small)
+        left, effect = (each - taken @ (taken.T @ each) for each in (left, effect))
         instrument = _slow(effect) if basis is None else basis @ (basis.T @ effect)
         instrument = instrument - taken @ (taken.T @ instrument)
         for block in np.unique(home):

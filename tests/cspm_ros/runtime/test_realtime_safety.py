@@ -292,7 +292,9 @@ def test_stopped_nodes_are_missed_one_after_the_other_and_come_back(warm, tmp_pa
         took = reaction(evidence, FORCE_CONTROLLER, TENSION_COMMAND, TORQUE_COMMAND, event=event)
         note(f"{name} stopped: {TENSION_COMMAND} to safe torque {took * 1e3:.0f} ms")
     silent = (TENSION, WINCH_STATE, TENSION_COMMAND)
-    assert reasons[3].startswith(tuple(f"{topic} stale: " for topic in silent))
+    # Or the computer was too busy to run it meanwhile, see `reaction`.
+    missed = *(f"{topic} stale: " for topic in silent), "stood still for "
+    assert reasons[3].startswith(missed)
     assert reasons[4].startswith("stood still for ")
     assert evidence.alarms(WATCHDOG)[-1][1].startswith(f"no {TORQUE_COMMAND} for ")
     # Through all of that the bar hung where it was.

@@ -77,9 +77,15 @@ class TableEnd:
         """Return how many lines at the end begin with a word, below others that do not."""
         for count, row in enumerate(reversed(lines[-_MOST_WORDS - 1 :])):
             first = self._first(row)
-            if first and not (first[0].isalpha() and first.lower() not in _NUMBERS):
+            worded = first[:1].isalpha() and first.lower() not in _NUMBERS
+            if not worded and (first or self._holds_more(row)):
                 return count
         return 0
+
+    def _holds_more(self, row: str) -> bool:
+        """Return whether a line has a cell beyond the names: a row, which is refused later."""
+        cells = self._rows.cells(self._rows.content(row))
+        return any(cell.strip() for cell in cells[self._width :])
 
 
 def _decimals(cell: str) -> int:

@@ -60,6 +60,9 @@ def test_a_decimal_comma_between_commas_is_refused(tmp_path):
 def test_a_width_that_changes_is_refused_with_its_line(tmp_path):
     for row in ("2,3,4", "2,3,4,5"):
         assert fault(tmp_path, f"t,q\n0,1\n1,2\n{row}\n").startswith("a.csv: line 4: ")
+    # A last row moved aside has an empty first cell, as words below the numbers may have.
+    assert fault(tmp_path, "t,q\n0,1\n,1,2\n").startswith("a.csv: line 3: 3 cells under 2 names")
+    assert read(tmp_path, "t,q\n0,1\n,2,\nMean,1\n").rows[STATE].tolist() == [[1.0]]
     short = "t,q,note\n0,1,a\n1,2\n2,3,c\n"
     assert fault(tmp_path, short) == (
         "a.csv: line 3: only 2 cells under 3 names (t, q, note), allowed: one each;"

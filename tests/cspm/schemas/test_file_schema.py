@@ -65,8 +65,9 @@ def content_of(kind, path=None):
 
 
 def is_read(kind, content, folder):
-    # The function that the campaign's file names.
-    shutil.copy(ROOT / "examples" / "campaigns" / "settling.py", folder)
+    # The functions that campaigns' files name.
+    for own in (ROOT / "examples" / "campaigns").glob("*.py"):
+        shutil.copy(own, folder)
     path = folder / ("file.json" if kind == "diagnosis" else "file.yaml")
     path.write_text(json.dumps(content) if kind == "diagnosis" else dump_yaml(content))
     try:

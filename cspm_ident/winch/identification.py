@@ -275,7 +275,8 @@ def linear_effects(names: Sequence[str]) -> list[Effect]:
 
 
 def _is_linear(effect: Effect) -> bool:
-    at_shaft = effect.signature.regression.channel is Channel.SHAFT
+    of_drive = effect.physics.sense is None
+    at_shaft = of_drive and effect.signature.regression.channel is Channel.SHAFT
     return at_shaft and not effect.signature.nonlinear and effect.signature.coefficients is None
 
 

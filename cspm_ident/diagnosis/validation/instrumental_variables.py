@@ -136,7 +136,7 @@ def _moments(
     home = (equation.times[thin] / block_s).astype(int)
     others = [c for c in weights if c in equation.columns and c not in own]
     # What every machine has is known better than data that resemble the finding tell.
-    small = [c for c in others if c.effect.is_negligible(c.effect.values(weights[c].tolist()))]
+    small = [c for c in others if c.effect.is_negligible(_values(c, weights))]
     for k in range(equation.target.shape[1]):
         effect = sum((equation.columns[c][thin, k] @ weights[c] for c in mine), np.zeros(len(home)))
         beside = [equation.columns[c][thin, k] for c in others if c not in small]
@@ -175,3 +175,7 @@ def _basis(columns: Array) -> Array:
     columns = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
     left, values, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(left[:, values > _LEAST * values.max(initial=0.0)])
+
+
+def _values(candidate: Candidate, weights: Mapping[Candidate, Array]) -> dict[str, float]:
+    return candidate.effect.values(weights[candidate].tolist(), **candidate.nonlinear)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -33,8 +33,9 @@ from cspm_ident.winch.parsimony import without_unseen
 from cspm_ident.winch.reconstruction import TorqueError, torque_error
 from cspm_ident.winch.recording import WinchSignals, winch_signals
 from cspm_msgs_py.errors import InputError
-from cspm_msgs_py.testbed import Testbed
-from cspm_sim.effects import catalogue
+from cspm_msgs_py.testbed import EffectEntry, Testbed
+from cspm_sim.effects import Effect, catalogue
+from cspm_sim.effects.effect import Channel
 
 EFFECTS = ("winch_viscous_friction", "winch_coulomb_friction", "winch_torque_offset")
 BAND_HZ = 40.0
@@ -122,7 +123,9 @@ def _identified(
     name: str, searched: Sequence[Measurement], held_out: Sequence[Measurement], way: _Way
 ) -> IdentifiedWinch:
     recordings = (*searched, *held_out)
+    known = tuple(_beside(searched[0].machine, name, way.effects))
     raw = [winch_signals(each, name, way.torque_age) for each in recordings]
+    raw = [replace(each, load=(*each.load, *known)) for each in raw]
     signals = [replace(each, angle=without_jumps(each.angle)) for each in raw]
     own = signals[: len(searched)]
     reversals = _reversals(own, way)
@@ -167,6 +170,19 @@ def _identified(
         ),
         source.signals[0].speed is not None,
     )
+
+
+def _beside(
+    machine: Testbed, name: str, fitted: Sequence[str]
+) -> Iterator[tuple[Effect, dict[str, float]]]:
+    """Yield what the test-bed file has at a winch's shaft beside inertia and fitted effects."""
+    for entry in machine.effects:
+        effect = catalogue()[entry.effect]
+        here = not entry.elements or name in entry.elements
+        physics, channel = effect.physics, effect.signature.regression.channel
+        adds = channel is Channel.SHAFT and physics.sense is None and physics.alter is None
+        if here and adds and entry.effect not in fitted:
+            yield effect, dict(entry.numbers)
 
 
 def _speeds(
@@ -256,19 +272,25 @@ def _noise_objection(source: MotionSource) -> Objection:
 def described_equation(machine: Testbed, name: str, effects: Sequence[str]) -> Equation:
     """Return a winch's inertia [kg·m²] and its effects' parameters, as the test-bed file has them.
 
-    Effects that stand in several entries add up, those that stand in none do nothing.
+    Effects that are in several entries add up, those that are in none do nothing.
     """
     inertia = next(cable.rotor_inertia for cable in machine.cables if cable.name == name)
+    inertia += sum(e.numbers["inertia"] for e in _acting(machine, name, "winch_inertia"))
     values = {}
     for effect in effects:
         parameters = catalogue()[effect].parameters
         total = {p.name: p.absent or 0.0 for p in parameters}
-        for entry in machine.effects:
-            if entry.effect == effect and (not entry.elements or name in entry.elements):
-                for p in parameters:
-                    total[p.name] += entry.numbers[p.name] - (p.absent or 0.0)
+        for entry in _acting(machine, name, effect):
+            for p in parameters:
+                total[p.name] += entry.numbers[p.name] - (p.absent or 0.0)
         values[effect] = total
     return inertia, values
+
+
+def _acting(machine: Testbed, name: str, effect: str) -> list[EffectEntry]:
+    """Return the entries of an effect that act on a winch."""
+    here = [e for e in machine.effects if not e.elements or name in e.elements]
+    return [entry for entry in here if entry.effect == effect]
 
 
 def fitted_equation(fit: WinchFit, effects: Sequence[str]) -> Equation:

@@ -53,7 +53,8 @@ class WinchSignals:
             period where a drive reports what it applied up to the stamp.
         speed: as the drive reports it [rad/s], one column, where acceleration and direction are
             taken from it instead of the angle; None takes them from the angle.
-        load: what is known to hang at the winch, as effects; see `load_effects`.
+        load: what is known to act at the shaft, as effects: what hangs there, see `load_effects`,
+            and what else the test-bed file has.
     """
 
     angle: Samples

@@ -197,6 +197,35 @@ def test_effects_of_a_winch_add_up():
         assert inertia == next(c.rotor_inertia for c in machine.cables if c.name == name)
 
 
+UNBALANCED = """
+effects:
+  - {effect: winch_unbalance, parameters: {cosine: 0.02, sine: -0.015, order: 1}}
+  - {effect: winch_inertia, parameters: {inertia: 6.0e-5}}
+  - {effect: winch_coulomb_friction, parameters: {torque: 0.012}}
+"""
+
+
+@pytest.mark.compiled
+def test_what_the_file_has_beside_the_fitted_is_no_part_of_them(tmp_path):
+    bundle = bundle_of("one_winch", "duration=8")
+    own = parse_testbed(bundle.testbed.text + UNBALANCED, "unbalanced")
+    run(dataclasses.replace(bundle, testbed=own), tmp_path / "run", lambda now: None)
+    known = read_measurement(tmp_path / "run")
+    bare = known.with_machine(own.testbed.model_copy(update={"effects": own.testbed.effects[1:]}))
+    found, without = (
+        identify_winches([each], torque_age=known.torque_age).winches[0] for each in (known, bare)
+    )
+    assert found.described["inertia"] == pytest.approx(3.0e-4)
+    assert found.fit.estimate.value("inertia") == pytest.approx(3.0e-4, rel=0.01)
+    described, false = (each.judgements[0].errors["described"].percent for each in (found, without))
+    assert described < 0.2
+    assert false > 10.0 * described
+    offset = "winch_torque_offset torque"
+    assert abs(found.fit.estimate.value(offset)) < 1e-3
+    # The shaft hardly turns: an unbalance that is not known of becomes an offset.
+    assert without.fit.estimate.value(offset) == pytest.approx(-0.02, rel=0.1)
+
+
 @pytest.fixture
 def short(tmp_path):
     """A recording that is there, with too little in it."""

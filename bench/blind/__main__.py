@@ -52,6 +52,13 @@ def make(
             help="real, or plain: white noise alone, to see what the sensors themselves cost.",
         ),
     ] = "real",
+    survey: Annotated[
+        float,
+        typer.Option(
+            metavar="MM",
+            help="Standard deviation of the places of exits and attachments, in half of them.",
+        ),
+    ] = 0.0,
     truth: Truth = None,
     jobs: Annotated[
         int | None,
@@ -62,7 +69,7 @@ def make(
     from bench.blind.commands import make_command
 
     where, ways = _truth(out, truth), tuple(strata or ())
-    make_command(out, where, seed, count, split, ways, duration, sensors, jobs)
+    make_command(out, where, seed, count, split, ways, duration, sensors, survey, jobs)
 
 
 @blind.command(

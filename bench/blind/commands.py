@@ -39,6 +39,7 @@ def make_command(
     strata: tuple[str, ...],
     duration: float,
     sensors: str,
+    survey: float,
     jobs: int | None,
 ) -> None:
     """Make a benchmark; see `make`.
@@ -51,7 +52,10 @@ def make_command(
     from bench.blind.strata import STRATA
 
     console = make_console()
-    options = Request(folder, truth, seed, count, split, strata or tuple(STRATA), duration, sensors)
+    ways = strata or tuple(STRATA)
+    options = Request(
+        folder, truth, seed, count, split, ways, duration, sensors, survey=1e-3 * survey
+    )
     with progress_bar(console) as show:
         make(options, show, jobs)
 

@@ -11,10 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bench.blind.blank_runs import Amounts, Tell, run_blank
 from bench.blind.concealed_run import believed, machine_of, record_concealed
 from bench.blind.item import Item, amounts_of, draw_items, truth_of
 from bench.blind.jobs import jobs_of
+from bench.blind.reality.alterations import surveyed
 from bench.blind.reality.phenomena import PHENOMENA
 from bench.blind.reality.reality import conceal
 from bench.blind.reality.sensors import QUALITIES, REAL
@@ -24,9 +27,10 @@ from cspm.campaign.cluster import worker_pool
 from cspm_msgs_py.errors import DivergenceError, InputError
 
 SHORTEST, LONGEST = 15.0, 200.0  # [s]
+LARGEST_SURVEY = 0.01  # beyond it the controllers lose the bar [m]
 # Of a number of the file, more is not taken over by an effect: it stays positive.
 MOST_ABSORBED = 0.8
-_PUBLISHED = ("seed", "count", "split", "duration", "sensors")
+_PUBLISHED = ("seed", "count", "split", "duration", "sensors", "survey")
 _ONE_DATE = 1_000_000_000  # of all files, so that it shows no order [s]
 
 
@@ -43,6 +47,8 @@ class Request:
         strata: names, of which the recordings are.
         duration: of each recording [s].
         sensors: one of `QUALITIES`.
+        survey: standard deviation of the places of exits and attachments in half of the recordings
+            [m].
     """
 
     folder: Path
@@ -53,6 +59,7 @@ class Request:
     strata: tuple[str, ...]
     duration: float
     sensors: str = REAL
+    survey: float = 0.0
 
     def published(self) -> dict[str, Any]:
         """Return what the truth file keeps of it."""
@@ -136,6 +143,9 @@ def _check(request: Request) -> None:
         raise InputError(f"--count {request.count}: allowed: 1 or more")
     if request.sensors not in QUALITIES:
         raise InputError(f"--sensors {request.sensors}: allowed: {', '.join(QUALITIES)}")
+    if not 0.0 <= request.survey <= LARGEST_SURVEY:
+        most = 1e3 * LARGEST_SURVEY
+        raise InputError(f"--survey {1e3 * request.survey:g}: allowed: 0 to {most:g} mm")
     if not SHORTEST <= request.duration <= LONGEST:
         raise InputError(f"--duration {request.duration:g}: allowed: {SHORTEST:g} to {LONGEST:g} s")
     if request.folder.resolve() in request.truth.resolve().parents:
@@ -158,7 +168,11 @@ def _write_truth(request: Request, tell: Tell) -> None:
         amounts = amounts_of(item, blank.limits[item.scenario], len(machine.cables))
         amounts |= _absorbed(item, amounts, blank.shares)
         reported.append(
-            {**truth_of(item, blank.likened(item, amounts), machine), "amounts": amounts}
+            {
+                **truth_of(item, blank.likened(item, amounts), machine),
+                "amounts": amounts,
+                "survey_m": _survey(request, item),
+            }
         )
     content = {
         "schema": SCHEMA,
@@ -199,13 +213,20 @@ def _place(request: Request, item: Item) -> Path:
     return request.folder / RECORDINGS / item.name
 
 
+def _survey(request: Request, item: Item) -> float:
+    """Return the survey's standard deviation in a recording [m]; every second seed has none."""
+    return request.survey if item.seed % 2 else 0.0
+
+
 def _record(request: Request, item: Item, amounts: Amounts) -> None:
     """Record an item; what diverges leaves an empty folder of that name."""
     folder = _place(request, item)
     part = request.folder / ".part" / item.name
     shutil.rmtree(part, ignore_errors=True)
     bundle = believed(item.scenario, request.duration, item.seed)
-    reality = conceal(bundle.testbed.testbed, amounts, item.onset, item.seed, request.sensors)
+    generator = np.random.default_rng([item.seed, 11])
+    machine = surveyed(bundle.testbed.testbed, _survey(request, item), generator)
+    reality = conceal(machine, amounts, item.onset, item.seed, request.sensors)
     note = f"The operator suspects {item.note}.\n".ljust(80)
     folder.parent.mkdir(parents=True, exist_ok=True)
     try:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from bench.blind.scoring.brier import brier_of
 from bench.blind.scoring.share import Share, share_of, share_words, upper_bound
 from bench.blind.scoring.target import Range, allowed
 from bench.blind.sealed_card import stored_card
@@ -36,6 +37,7 @@ class Part(NamedTuple):
         found: cells of the table against the targets, by row.
         targets: of the same rows; empty where there is none.
         amounts: cells by detection limits and column.
+        probabilities: by bin, the mean reported and the share that was right.
     """
 
     number: str
@@ -45,6 +47,7 @@ class Part(NamedTuple):
     found: Mapping[str, str]
     targets: Mapping[str, str]
     amounts: Mapping[str, Mapping[str, str]]
+    probabilities: Sequence[tuple[float, Share]] = ()
 
 
 def main() -> None:
@@ -69,7 +72,7 @@ def read_parts(folder: Path = STORE) -> list[Part]:
     Args:
         folder: that of the CSV files.
     """
-    names = ("recordings", "targets", "amounts")
+    names = ("recordings", "targets", "amounts", "probabilities")
     stored = {name: read_table(folder, name) for name in names}
     return [_part(each, stored) for each in read_table(folder, "parts")]
 
@@ -92,6 +95,11 @@ def _part(part: Mapping[str, str], stored: Mapping[str, list[dict[str, str]]]) -
             row["detection limits"]: {head: cell for head, cell in row.items() if head not in known}
             for row in own["amounts"]
         },
+        probabilities=[
+            (float(row["mean"]), pooled([row["effect right"]]))
+            for row in own["probabilities"]
+            if _COUNTS.search(row["effect right"])
+        ],
     )
 
 
@@ -120,6 +128,7 @@ def tables(parts: Sequence[Part]) -> dict[str, str]:
             (_summary(parts, rows), markdown_table(("", "found", "target", ""), rows))
         ),
         "amounts": markdown_table(*_amounts(parts)),
+        "probabilities": _probabilities(parts),
         "sets": markdown_table(
             ("part", "set", "scored", "recordings"),
             [
@@ -159,6 +168,19 @@ def _summary(parts: Sequence[Part], rows: Sequence[tuple[str, ...]]) -> str:
     judged = {word: [row[0] for row in rows if row[3] == word] for word in _VERDICTS}
     reported = (f"{word.capitalize()}: {', '.join(own)}." for word, own in judged.items() if own)
     return f"{count} recordings in {len(parts)} parts. {' '.join(reported)}"
+
+
+def _probabilities(parts: Sequence[Part]) -> str:
+    """Return the Brier score of each part that has reported a probability."""
+    found = [(part.number, brier_of(part.probabilities)) for part in parts]
+    return markdown_table(
+        ("part", "findings", "Brier score", "of the share of all that are right"),
+        [
+            (number, str(own.findings), f"{own.score:.3f}", f"{own.constant:.3f}")
+            for number, own in found
+            if own is not None
+        ],
+    )
 
 
 def _amounts(parts: Sequence[Part]) -> tuple[list[str], list[list[str]]]:

@@ -86,6 +86,36 @@ def wider(testbed: Testbed, radius: Array) -> Testbed:
     return _each(testbed, radius, change)
 
 
+def surveyed(testbed: Testbed, error: float, generator: np.random.Generator) -> Testbed:
+    """Return a machine whose exits and attachments lie beside those of its file.
+
+    Attachments stay on the bar's own axis: beside it cables turn the bar, and none holds it.
+
+    Args:
+        testbed: the machine as it was surveyed.
+        error: standard deviation of each coordinate [m].
+        generator: of the errors.
+    """
+
+    def beside(
+        point: tuple[float, float, float] | None, axes: int
+    ) -> tuple[float, float, float] | None:
+        if point is None:
+            return None
+        moved = np.array(point)
+        moved[:axes] += generator.normal(0.0, error, axes)
+        x, y, z = moved.tolist()
+        return x, y, z
+
+    cables = tuple(
+        cable.model_copy(
+            update={"exit": beside(cable.exit, 3), "attachment": beside(cable.attachment, 1)}
+        )
+        for cable in testbed.cables
+    )
+    return testbed.model_copy(update={"cables": cables})
+
+
 def _each(testbed: Testbed, amounts: Array, change: Callable[[Cable, float], Cable]) -> Testbed:
     cables = tuple(
         change(cable, float(amount)) if amount else cable

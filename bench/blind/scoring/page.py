@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from bench.blind.scoring.share import share_words
+from bench.blind.scoring.brier import brier_of
+from bench.blind.scoring.share import share_of, share_words
 from bench.blind.scoring.target import Judged, findings_judged, numbers_judged
 from bench.markdown import markdown_table
 
@@ -246,7 +247,14 @@ def _calibration(rows: Sequence[Data]) -> str:
         (f"{row['from']:g} to {row['to']:g}", _number(row["said"]), share_words(row["right"]))
         for row in rows
     )
-    return markdown_table(("reported probability", "mean", "effect right"), reported)
+    table = markdown_table(("reported probability", "mean", "effect right"), reported)
+    found = brier_of([(row["said"] or 0.0, share_of(*row["right"][:2])) for row in rows])
+    if found is None:
+        return table
+    return (
+        f"{table}\n\nBrier score by these bins: {found.score:.3f}. The share of all that are right,"
+        f" reported of each, would score {found.constant:.3f}."
+    )
 
 
 def _recordings(outcomes: Sequence[Data]) -> str:

@@ -139,6 +139,8 @@ def request(folder, **changed):
         ({"split": "all"}, r"^--split all: allowed: dev, tune, sealed$"),
         ({"sensors": "bad"}, r"^--sensors bad: allowed: real, plain$"),
         ({"count": 0}, r"^--count 0: allowed: 1 or more$"),
+        ({"survey": 0.02}, r"^--survey 20: allowed: 0 to 10 mm$"),
+        ({"survey": -0.001}, r"^--survey -1: allowed: 0 to 10 mm$"),
         ({"duration": 3.0}, r"^--duration 3: allowed: 15 to 200 s$"),
     ],
 )

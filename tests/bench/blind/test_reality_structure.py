@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", minversion="4.0", reason="the MuJoCo plant needs MuJoCo 4")
+from bench.blind.reality.alterations import surveyed
 from bench.blind.reality.detection_limit import detection_limits
 from bench.blind.reality.drive import SlowDrive
 from bench.blind.reality.frame import YIELDING_HZ, YIELDING_SHARES, YieldingFrame
@@ -40,6 +41,20 @@ def scene(along=DOWN, tension=5.0, body=(0, 0, 0), rate=(0, 0, 0), frame=(0, 0, 
         np.array([*(ends[0] if origin is None else origin), *body, *rate], dtype=float),
         np.eye(3),
     )
+
+
+def test_a_survey_puts_exits_anywhere_and_attachments_along_the_bar(eight):
+    def off(key, error, seed):
+        found = surveyed(eight, error, np.random.default_rng(seed)).cables
+        pairs = zip(found, eight.cables, strict=True)
+        return np.array([np.subtract(getattr(a, key), getattr(b, key)) for a, b in pairs])
+
+    exits = np.concatenate([off("exit", 1e-3, seed) for seed in range(50)])
+    attachments = np.concatenate([off("attachment", 1e-3, seed) for seed in range(50)])
+    assert exits.std(axis=0) == pytest.approx([1e-3] * 3, rel=0.15)
+    assert attachments.std(axis=0) == pytest.approx([1e-3, 0.0, 0.0], rel=0.15)
+    assert abs(exits.mean()) < 2e-4
+    assert surveyed(eight, 0.0, np.random.default_rng(1)) == eight
 
 
 def acted(influence, now):

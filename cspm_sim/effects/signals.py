@@ -46,6 +46,7 @@ class CableSignal(IntEnum):
     DOWNWARD = 16  # share of the cable's direction downwards, from exit to attachment
     LENGTH_BY_EXIT = 17  # three, slopes of its length over the exit x y z in winch frame axes
     LENGTH_BY_ATTACHMENT = 20  # three, over the attachment x y z in bar axes
+    LENGTH_BY_PULLEY = 23  # over the radius of a pulley at the exit
 
 
 class BarSignal(IntEnum):
@@ -73,6 +74,7 @@ class EndSignal(IntEnum):
     TENSION = 14
     WRENCH_BY_EXIT = 15  # 6 × 3 row by row, slopes per newton of its wrench on the bar
     WRENCH_BY_ATTACHMENT = 33  # likewise, over the attachment
+    WRENCH_BY_PULLEY = 51  # six, over the radius of a pulley at the exit
 
 
 class FrameSignal(IntEnum):

@@ -60,11 +60,11 @@ def shifted(place: Sequence[float], values: Values) -> list[float]:
 
 
 def pulling_columns(signals: Array, at: slice) -> Array:
-    """Return the first order of a moved end in its cable's tension: a longer cable pulls more.
+    """Return the first order of another geometry in its cable's tension: a longer one pulls more.
 
     Args:
         signals: `CableSignal` rows.
-        at: slopes of the length over the end's coordinates.
+        at: slopes of the length over what has changed.
     """
     stiffness = signals[:, CableSignal.STIFFNESS, None]
     return np.asarray((stiffness * signals[:, at])[:, None])
@@ -75,7 +75,7 @@ def wrench_columns(signals: Array, at: slice) -> Array:
 
     Args:
         signals: `EndSignal` rows.
-        at: slopes of the wrench per newton over the end's coordinates.
+        at: slopes of the wrench per newton over what has changed, six rows of them.
     """
-    slopes = signals[:, at].reshape(-1, 6, 3)
+    slopes = signals[:, at].reshape(len(signals), 6, -1)
     return np.asarray(signals[:, EndSignal.TENSION, None, None] * slopes)

@@ -320,6 +320,12 @@ def is_surveyed(effect: Effect) -> bool:
     return effect.physics.alter is not None and bool(effect.signature.negligible)
 
 
+def are_places(effect: Effect) -> bool:
+    """Return whether an effect moves places, surveyed or of markers, by numbers of a usual size."""
+    sizes = [parameter.usual for parameter in effect.linear]
+    return len(sizes) > 1 and None not in sizes and not effect.signature.coefficients
+
+
 def is_early(weights: Mapping[Candidate, Array], hypothesis: Hypothesis) -> bool:
     """Return whether readings would be newer than their stamps by more than a healthy clock allows.
 

@@ -37,6 +37,8 @@ class Fits:
     def __init__(self, gram: BlockGram, sums: BlockRegression) -> None:
         """Take the Gram matrices and their regression."""
         self.gram, self.sums = gram, sums
+        # Intervals take most of a search, and are asked for of the same hypotheses again.
+        self._weights: dict[tuple[tuple[Candidate, ...], frozenset[str]], Weights] = {}
 
     @property
     def thresholds(self) -> Thresholds:
@@ -63,7 +65,11 @@ class Fits:
 
     def weights(self, hypotheses: Sequence[Hypothesis]) -> Weights:
         """Return the weights of hypotheses fitted together, with half their intervals' widths."""
-        return weights_of(self.gram, self.sums, *parts_of(hypotheses))
+        candidates, common = parts_of(hypotheses)
+        key = tuple(candidates), frozenset(common)
+        if key not in self._weights:
+            self._weights[key] = weights_of(self.gram, self.sums, candidates, common)
+        return self._weights[key]
 
     def values(
         self, hypotheses: Sequence[Hypothesis], beside: Sequence[Hypothesis] = ()

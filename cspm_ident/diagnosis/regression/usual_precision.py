@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cspm_ident.diagnosis.regression.block_gram import BlockGram
+from cspm_ident.diagnosis.regression.hypothesis import are_places
 from cspm_ident.diagnosis.residuals.regressors import Candidate
 
 Array = NDArray[np.float64]
@@ -19,9 +20,9 @@ def usual_precision(gram: BlockGram) -> Array:
     """
     found = np.zeros(gram.width)
     for term, span in gram.slices.items():
-        if not isinstance(term, Candidate) or term.effect.signature.coefficients:
+        if not isinstance(term, Candidate) or not are_places(term.effect):
             continue
         sizes = [parameter.usual for parameter in term.effect.linear]
-        if len(sizes) > 1 and None not in sizes and span.stop - span.start == len(sizes):
+        if span.stop - span.start == len(sizes):
             found[span] = np.array(sizes, dtype=float) ** -2.0
     return found

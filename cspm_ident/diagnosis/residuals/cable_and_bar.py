@@ -21,8 +21,20 @@ from cspm_ident.signals.cable_motion import damping_of
 from cspm_model.elastic_law import elongation_at, law_at
 from cspm_model.end_slopes import EndSlopes, end_slopes
 from cspm_model.equilibrium import unstretched_lengths
-from cspm_model.kernels.cable import EXIT, GEAR_RATIO, OFFSET_LENGTH, RADIUS
+from cspm_model.kernels.cable import (
+    EXIT,
+    GEAR_RATIO,
+    HAS_CABLE,
+    OFFSET_LENGTH,
+    PARTS,
+    PULLEY_AXIS,
+    PULLEY_RADIUS,
+    RADIUS,
+    ROUTE,
+)
 from cspm_model.kernels.machine import PlantParameters
+from cspm_model.kernels.route import STOP_COUNT
+from cspm_model.pulley_slopes import UPWARDS, Span, pulley_slopes
 from cspm_msgs_py.testbed import Testbed
 from cspm_sim.effects.bar_motion import carried
 from cspm_sim.effects.signals import BarSignal, CableSignal
@@ -325,7 +337,7 @@ class Suspension:
         """Return `CableSignal` columns of cable i."""
         count, cables = len(self.signals.times), self.parameters.cables
         # Column by column in memory, as they are read.
-        rows = np.zeros((count, int(CableSignal.LENGTH_BY_ATTACHMENT) + 3), order="F")
+        rows = np.zeros((count, int(CableSignal.LENGTH_BY_PULLEY) + 1), order="F")
         lengths, wound = self._spans.lengths[:, i], self._wound[:, i]
         directions = self._spans.directions[:, i]
         for column, values in {
@@ -348,7 +360,10 @@ class Suspension:
             CableSignal.GRAVITY: self._testbed.gravity,
         }.items():
             rows[:, column] = values
-        rows[:, CableSignal.LENGTH_BY_EXIT :] = self._length_by_ends[:, i]
+        rows[:, CableSignal.LENGTH_BY_EXIT : CableSignal.LENGTH_BY_PULLEY] = self._length_by_ends[
+            :, i
+        ]
+        rows[:, CableSignal.LENGTH_BY_PULLEY], _ = self._pulley_slopes(i)
         return rows
 
     @cached_property
@@ -363,6 +378,17 @@ class Suspension:
         poses = self.signals.bar.poses, self.signals.frame.poses
         return end_slopes(self.parameters.cables[i : i + 1], *poses)
 
+    def _pulley_slopes(self, i: int) -> tuple[Array, Array]:
+        """Return slopes over the radius of a pulley at cable i's exit; zeros where it has none."""
+        row, spans = self.parameters.cables[i], self._spans
+        if row[ROUTE + STOP_COUNT] > 0.0 or row[PARTS] != 1.0 or not row[HAS_CABLE]:
+            count = len(self.signals.times)
+            return np.zeros(count), np.zeros((count, 6))
+        radius = float(row[PULLEY_RADIUS])
+        axis = row[PULLEY_AXIS : PULLEY_AXIS + 3] if radius else np.array(UPWARDS)
+        ends = spans.directions[:, i], spans.arms[:, i], spans.lengths[:, i]
+        return pulley_slopes(Span(*ends, self._frame.rotation @ axis, radius))
+
     def end_rows(self, i: int) -> Array:
         """Return `EndSignal` columns of cable i."""
         spans, place = self._spans.only(i), self.parameters.cables[i : i + 1, EXIT : EXIT + 3]
@@ -372,7 +398,8 @@ class Suspension:
         slopes, count = self._end_slopes(i), len(gravity)
         wrenches = (slopes.exit_wrenches, slopes.attachment_wrenches)
         ends = (each.reshape(count, 18) for each in wrenches)
-        return np.hstack([*parts, gravity, exits[:, 0], self.signals.tensions[:, i, None], *ends])
+        own, (_, pulley) = self.signals.tensions[:, i, None], self._pulley_slopes(i)
+        return np.hstack([*parts, gravity, exits[:, 0], own, *ends, pulley])
 
     @cached_property
     def bar_rows(self) -> Array:

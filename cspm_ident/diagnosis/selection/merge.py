@@ -29,7 +29,9 @@ def one_instead(
         chosen: all selected hypotheses.
         free: candidates that may be added.
     """
-    found = [h for h in chosen if not fits.is_negligible(h, chosen)]
+    found = [
+        h for h in chosen if not (fits.is_negligible(h, chosen) or fits.is_calibration(h, chosen))
+    ]
     if any(h.onset for h in found):
         return None
     left = fits.sums.held_out(fits.columns(chosen))

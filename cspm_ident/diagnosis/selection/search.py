@@ -17,6 +17,7 @@ from cspm_ident.diagnosis.regression.block_gram import BlockGram
 from cspm_ident.diagnosis.regression.block_regression import BlockRegression, Gain, gain_of
 from cspm_ident.diagnosis.regression.hypothesis import (
     Hypothesis,
+    are_places,
     boldness,
     has_one_system,
     is_number,
@@ -356,13 +357,25 @@ class Search:
         together = [*chosen, hypothesis]
         if not self.fits.is_plausible(together) or self.fits.contradicts(hypothesis, chosen):
             return None
-        if is_surveyed(hypothesis.effect) and self.fits.is_negligible(hypothesis, together):
+        if self._is_of_survey(hypothesis, chosen):
             return None
         gained = before - self.fits.held_out(hypothesis, base)
         known = len(chosen)
         return (
             gained if self.significance.counts(base, hypothesis, gain_of(gained), known) else None
         )
+
+    def _is_of_survey(self, hypothesis: Hypothesis, chosen: Sequence[Hypothesis]) -> bool:
+        """Return whether a survey's accuracy explains it, or places that are calibrated already.
+
+        A body's markers that are off cannot be distinguished from all its cables' ends that are.
+        """
+        if are_places(hypothesis.effect) and any(
+            are_places(each.effect) and self.fits.is_calibration(each, chosen) for each in chosen
+        ):
+            return True
+        own = [*chosen, hypothesis]
+        return is_surveyed(hypothesis.effect) and self.fits.is_negligible(hypothesis, own)
 
     def _rivals(
         self, hypothesis: Hypothesis, free: Sequence[Candidate], base: Index

@@ -50,7 +50,12 @@ EFFECT = Effect(
         shows=(
             "tension residual of one cable follows its direction, so the poses of bar and frame"
         ),
-        confounded_with=("frame_pose_offset", "cable_attachment_offset", "cable_stiffness"),
+        confounded_with=(
+            "frame_pose_offset",
+            "cable_attachment_offset",
+            "cable_stiffness",
+            "pulley_radius",
+        ),
         separating_experiment=(
             "move the bar through the workspace along all axes, translations and rotations apart"
         ),

@@ -85,7 +85,12 @@ EFFECT = Effect(
         shows=(
             "cable length residuals of all cables at once, in the pattern of one small displacement"
         ),
-        confounded_with=("pose_offset", "frame_flexibility", "cable_exit_offset"),
+        confounded_with=(
+            "pose_offset",
+            "frame_flexibility",
+            "cable_exit_offset",
+            "pulley_radius",
+        ),
         separating_experiment="hold the bar at several poses, then turn the winch frame and repeat",
         reference="thesis (2-2): exits p_a + R_a·a",
     ),

@@ -40,6 +40,10 @@ ALTERED = [
         entry("cable_attachment_offset", ["c2"], x=0.01, y=-0.02, z=0.03),
         {"cables.2.attachment": [-0.40, 0.16, 0.09]},
     ),
+    (
+        entry("pulley_radius", ["c2"], radius=0.02),
+        {"cables.2.pulley": {"radius": 0.02, "axis": [0.0, 0.0, -1.0]}},
+    ),
     (entry("cable_axial_damping", ["c2"], scale=1.5), {"cables.2.damping.factor": 1.5}),
     (
         entry("cable_stiffness", ["c2"], scale=1.25),

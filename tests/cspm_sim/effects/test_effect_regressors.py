@@ -60,6 +60,7 @@ FIRST_ORDER = {
     "cable_length_offset": {"offset": 0.05},
     "cable_exit_offset": {"x": 3e-4, "y": -2e-4, "z": 4e-4},
     "cable_attachment_offset": {"x": -2e-4, "y": 4e-4, "z": 3e-4},
+    "pulley_radius": {"radius": 3e-4},
     "cable_sag": {"linear_density": 3e-4},
     "bar_com": {"x": 0.004, "y": -0.003, "z": 0.005},
     "frame_pose_offset": {

@@ -70,6 +70,7 @@ CONTRACT = {
     "cable_exit_offset": "x y z",
     "cable_attachment_offset": "x y z",
     "pulley_friction": "coefficient wrap",
+    "pulley_radius": "radius",
     "cable_transverse_damping": "coefficient",
     "bar_mass": "mass",
     "bar_com": "x y z",

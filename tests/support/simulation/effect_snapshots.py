@@ -17,6 +17,7 @@ from cspm_model.kernels.cable import (
     law_scale,
 )
 from cspm_model.kernels.machine import frame_placement
+from cspm_model.kernels.pulley import around_pulley
 from cspm_model.kinematics import rotation
 from cspm_sim.effects.signals import BarSignal, CableSignal, EndSignal, FrameSignal, WinchSignal
 from cspm_sim.kernels.plant import make_scratch, plant_rate, state_count
@@ -31,6 +32,13 @@ def wrench_slopes(line, arm, base, turn):
     moments = [np.cross(arm, of_exit.T).T, np.cross(arm, of_attachment.T).T]
     moments[1] -= np.cross(turn.T, pull).T
     return np.vstack([of_exit, moments[0]]), np.vstack([of_attachment, moments[1]])
+
+
+def by_pulley(line, base):
+    """Length and direction of a cable per radius of a pulley that it enters upwards."""
+    up, step = tuple(-base[:, 2]), 1e-6
+    (length, pull), (longer, turned) = (around_pulley(tuple(line), up, r) for r in (0.0, step))
+    return (longer - length) / step, (np.array(turned) - pull) / step
 
 
 class Snapshots:
@@ -109,7 +117,7 @@ class Snapshots:
 
     def cable(self, i):
         """Signals of cable i."""
-        out = np.zeros((len(self.states), CableSignal.LENGTH_BY_ATTACHMENT + 3))
+        out = np.zeros((len(self.states), CableSignal.LENGTH_BY_PULLEY + 1))
         row, damping = self.p0.cables[i], self.nominal.cables[i].damping
         for k, state in enumerate(self.states):
             unstretched, span = state[12 + i], self.spans[k, i]
@@ -136,7 +144,8 @@ class Snapshots:
             out[k, CableSignal.DOWNWARD] = span[2]
             base, turn = rotation(self.frames[k][:6]), rotation(state[:6])
             out[k, CableSignal.LENGTH_BY_EXIT :][:3] = -span[:3] @ base
-            out[k, CableSignal.LENGTH_BY_ATTACHMENT :] = span[:3] @ turn
+            out[k, CableSignal.LENGTH_BY_ATTACHMENT :][:3] = span[:3] @ turn
+            out[k, CableSignal.LENGTH_BY_PULLEY], _ = by_pulley(span[:3] * length, base)
         out[:, CableSignal.GRAVITY] = self.nominal.gravity
         out[:, CableSignal.ANGLE] = self.angles(i)
         out[:, CableSignal.RADIUS], out[:, CableSignal.GEAR] = (
@@ -172,7 +181,7 @@ class Snapshots:
 
     def ends(self, i):
         """Signals of cable i's end at the bar."""
-        out = np.zeros((len(self.states), EndSignal.WRENCH_BY_ATTACHMENT + 18))
+        out = np.zeros((len(self.states), EndSignal.WRENCH_BY_PULLEY + 6))
         cable = self.nominal.cables[i]
         for k, (state, frame) in enumerate(zip(self.states, self.frames, strict=True)):
             turn, base = rotation(state[:6]), rotation(frame[:6])
@@ -190,7 +199,9 @@ class Snapshots:
             out[k, EndSignal.EXIT_VELOCITY :][:3] = exit_velocity
             by_exit, by_attachment = wrench_slopes(line, arm, base, turn)
             out[k, EndSignal.WRENCH_BY_EXIT :][:18] = by_exit.ravel()
-            out[k, EndSignal.WRENCH_BY_ATTACHMENT :] = by_attachment.ravel()
+            out[k, EndSignal.WRENCH_BY_ATTACHMENT :][:18] = by_attachment.ravel()
+            _, turned = by_pulley(line, base)
+            out[k, EndSignal.WRENCH_BY_PULLEY :] = -np.hstack([turned, np.cross(arm, turned)])
         out[:, EndSignal.GRAVITY] = self.nominal.gravity
         out[:, EndSignal.TENSION] = self.spans[:, i, TENSION]
         return out
